@@ -1,0 +1,50 @@
+// The arbiter turns the newest cue of every behaviour into one intention. A cue older than its age limit is absent.
+// Avoid wins over everything else a behaviour says; heading and pitch are weighted sums; height comes from the first
+// source in the fallback order that can see.
+#pragma once
+
+#include <array>
+
+#include "types/messages.h"
+
+namespace wasp::control {
+
+inline constexpr int kMaxBehaviours = 16;
+
+/// How the arbiter treats one behaviour; row i belongs to Cue::behaviour == i.
+struct ArbiterRow {
+  DurationNs age_limit_ns = 250 * kMillisecond;
+  int height_rank = -1;         ///< 0 is asked first; -1: never a height source
+  float heading_weight = 0.f;   ///< >= 0
+  float pitch_weight = 0.f;     ///< >= 0
+};
+
+struct ArbiterParams {
+  int behaviour_count = 0;
+  std::array<ArbiterRow, kMaxBehaviours> rows{};
+};
+
+/// The newest cue of each behaviour; `present[i]` false until the first.
+struct CueSet {
+  std::array<Cue, kMaxBehaviours> cues{};
+  std::array<bool, kMaxBehaviours> present{};
+};
+
+struct Intention {
+  int height_source = -1;            ///< behaviour index, -1: nobody can see the ground
+  float height_m = 0;
+  float height_sigma_m = 0;
+  TimeNs height_exposed_at_ns = kNever;
+  bool avoid = false;
+  float heading_rate_radps = 0;
+  float pitch_rad = 0;
+  TimeNs oldest_exposed_at_ns = kNever;  ///< oldest evidence in this intention
+};
+
+/// True if the cue may be used at `now_ns`: valid, finite, made within its budget and within its age limit. Realtime-safe: yes.
+bool usable(const Cue& cue, const ArbiterRow& row, TimeNs now_ns) noexcept;
+
+/// Realtime-safe: yes.
+Intention arbitrate(const ArbiterParams& params, const CueSet& set, TimeNs now_ns) noexcept;
+
+}  // namespace wasp::control

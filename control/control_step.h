@@ -1,0 +1,68 @@
+// One control period, pure: cues -> arbiter -> altitude hold -> limits -> flight mode -> one command. The real-time loop
+// and the lockstep simulation call this same function.
+#pragma once
+
+#include "control/altitude_hold.h"
+#include "control/arbiter.h"
+#include "control/flight_mode.h"
+#include "control/height_filter.h"
+#include "control/limits.h"
+#include "control/mission.h"
+#include "types/messages.h"
+
+namespace wasp::control {
+
+enum class FailsafeAction : std::uint8_t { kDescend, kStopStream };
+
+struct ControlParams {
+  ArbiterParams arbiter;
+  HeightFilterParams height_filter;
+  AltitudeHoldParams altitude_hold;
+  LimitParams limits;
+  MissionParams mission;
+  DurationNs attitude_age_limit_ns = 200 * kMillisecond;
+  DurationNs link_age_limit_ns = 300 * kMillisecond;   ///< silence after which the link counts as lost
+  DurationNs ground_hold_limit_ns = 1 * kSecond;       ///< how long to hold on the accelerometer alone
+  float failsafe_thrust_share = 0.96f;                 ///< of hover thrust: a gentle descent
+  FailsafeAction failsafe_action = FailsafeAction::kDescend;
+};
+
+/// What the autopilot last said of itself.
+struct AutopilotState {
+  TimeNs heard_at_ns = kNever;  ///< any valid frame
+  bool armed = false;
+  bool follows = false;         ///< in the mode in which it obeys setpoints
+};
+
+struct ControlInput {
+  TimeNs now_ns = 0;
+  float dt_s = 0.05f;
+  CueSet cues;
+  bool attitude_present = false;
+  AttitudeSample attitude;
+  bool accel_present = false;
+  std::array<float, 3> accel_body_mps2{};  ///< mean specific force since the last tick
+  AutopilotState autopilot;
+  bool stop_requested = false;
+  bool deadlines_missed = false;  ///< the last two ticks
+};
+
+struct ControlState {
+  HeightFilterState height;
+  AltitudeHoldState altitude_hold;
+  Setpoint sent;
+  ModeState mode;
+  MissionState mission;
+  TimeNs ground_seen_at_ns = kNever;
+};
+
+/// The command, and what to ask of the autopilot besides.
+struct ControlOutput {
+  Command command;
+  bool ask_arm = false, ask_disarm = false;
+};
+
+/// Realtime-safe: yes. Command::sent is 1 when the setpoint must go out, 0 when the stream stops on purpose.
+ControlOutput control_step(const ControlParams& params, const ControlInput& input, ControlState& state) noexcept;
+
+}  // namespace wasp::control

@@ -1,0 +1,52 @@
+#include "control/flight_mode.h"
+
+#include <array>
+
+namespace wasp::control {
+namespace {
+
+struct Row {
+  bool (*applies)(const Situation&) noexcept;
+  FlightMode mode;
+  ModeReason reason;
+};
+
+constexpr std::array kRows = {
+    Row{[](const Situation& s) noexcept { return !s.autopilot_armed; }, FlightMode::kDisarmed, ModeReason::kMissionStep},
+    Row{[](const Situation& s) noexcept { return !s.link_alive; }, FlightMode::kFailsafe, ModeReason::kLinkLost},
+    Row{[](const Situation& s) noexcept { return !s.autopilot_follows; }, FlightMode::kManual, ModeReason::kAutopilotLeft},
+    Row{[](const Situation& s) noexcept { return !s.attitude_fresh; }, FlightMode::kFailsafe, ModeReason::kAttitudeLost},
+    Row{[](const Situation& s) noexcept { return !s.setpoint_finite; }, FlightMode::kFailsafe, ModeReason::kNotFinite},
+    Row{[](const Situation& s) noexcept { return s.ground_lost_long; }, FlightMode::kFailsafe, ModeReason::kCueLost},
+    Row{[](const Situation& s) noexcept { return s.deadlines_missed; }, FlightMode::kHold, ModeReason::kDeadlineMissed},
+    Row{[](const Situation& s) noexcept { return !s.ground_seen; }, FlightMode::kHold, ModeReason::kCueLost},
+    Row{[](const Situation&) noexcept { return true; }, FlightMode::kBehaviour, ModeReason::kMissionStep},
+};
+
+}  // namespace
+
+bool flight_mode_step(const Situation& situation, ModeState& state) noexcept {
+  for (const Row& row : kRows) {
+    if (!row.applies(situation)) continue;
+    if (row.mode == state.mode) return false;
+    state = {row.mode, row.reason};
+    return true;
+  }
+  return false;
+}
+
+const char* name_of(FlightMode mode) noexcept {
+  constexpr std::array kNames = {"disarmed", "hold", "behaviour", "manual", "failsafe"};
+  const auto i = static_cast<std::size_t>(mode);
+  return i < kNames.size() ? kNames[i] : "unknown";
+}
+
+const char* name_of(ModeReason reason) noexcept {
+  constexpr std::array kNames = {"none", "start", "mission step", "ground lost", "ground seen again", "attitude lost",
+                                 "attitude back", "link lost", "link back", "pilot", "setpoint not finite",
+                                 "autopilot left our mode", "deadlines missed", "stop requested", "landed"};
+  const auto i = static_cast<std::size_t>(reason);
+  return i < kNames.size() ? kNames[i] : "unknown";
+}
+
+}  // namespace wasp::control

@@ -1,0 +1,97 @@
+#include "control/mission.h"
+
+namespace wasp::control {
+namespace {
+
+constexpr float kLandedMargin_m = 0.06f;  // this close to the standing height counts as standing
+constexpr DurationNs kLandedFor = 700 * kMillisecond;
+constexpr float kBelowGround_m = 0.25f;  // landing target: firmly onto the floor
+
+void enter(MissionState& s, MissionPhase phase, TimeNs now_ns) noexcept {
+  s.phase = phase;
+  s.since_ns = now_ns;
+  s.settled_since_ns = kNever;
+}
+
+MissionPhase leg_phase(int i) noexcept { return static_cast<MissionPhase>(static_cast<int>(MissionPhase::kLeg0) + i); }
+
+bool standing_long_enough(const MissionInput& in, MissionState& s) noexcept {
+  if (!in.ground_seen || in.height_m > s.ground_height_m + kLandedMargin_m) {
+    s.settled_since_ns = kNever;
+    return false;
+  }
+  if (s.settled_since_ns == kNever) s.settled_since_ns = in.now_ns;
+  return in.now_ns - s.settled_since_ns >= kLandedFor;
+}
+
+MissionWish wait_and_arm(const MissionParams& p, const MissionInput& in, MissionState& s, double in_phase_s) noexcept {
+  MissionWish wish;
+  const bool ready = in.ground_seen || p.follow_recording;
+  if (in.stop_requested) {
+    enter(s, in.armed ? MissionPhase::kDisarm : MissionPhase::kDone, in.now_ns);
+  } else if (in_phase_s > static_cast<double>(p.patience_s)) {
+    enter(s, MissionPhase::kBroken, in.now_ns);
+  } else if (s.phase == MissionPhase::kWait && ready) {
+    s.ground_height_m = in.height_m;
+    enter(s, MissionPhase::kArm, in.now_ns);
+  } else if (s.phase == MissionPhase::kArm) {
+    wish.armed = true;
+    if (!in.armed) s.ground_height_m = in.height_m;
+    if (in.armed && in.follows) enter(s, leg_phase(0), in.now_ns);
+  }
+  wish.target_m = in.height_m;
+  return wish;
+}
+
+MissionWish fly_leg(const MissionParams& p, const MissionInput& in, MissionState& s, double in_phase_s) noexcept {
+  const int leg = leg_of(s.phase);
+  const bool last = p.follow_recording || leg + 1 >= p.leg_count;
+  const double length_s = static_cast<double>(p.follow_recording ? p.recording_seconds : p.legs[static_cast<std::size_t>(leg)].seconds);
+  MissionWish wish;
+  wish.rotors = true;
+  wish.armed = true;
+  wish.target_m = p.follow_recording ? s.ground_height_m : p.legs[static_cast<std::size_t>(leg)].height_m;
+  if (!in.armed) enter(s, MissionPhase::kBroken, in.now_ns);  // disarmed in flight: never armed again from here
+  else if (in.stop_requested) enter(s, p.follow_recording ? MissionPhase::kDisarm : MissionPhase::kLand, in.now_ns);
+  else if (in_phase_s >= length_s && !last) enter(s, leg_phase(leg + 1), in.now_ns);
+  else if (in_phase_s >= length_s) enter(s, p.follow_recording ? MissionPhase::kDisarm : MissionPhase::kLand, in.now_ns);
+  return wish;
+}
+
+}  // namespace
+
+MissionWish mission_step(const MissionParams& p, const MissionInput& in, MissionState& s) noexcept {
+  if (s.since_ns == kNever) s.since_ns = in.now_ns;
+  const double in_phase_s = to_seconds(in.now_ns - s.since_ns);
+  MissionWish wish;
+  switch (s.phase) {
+    case MissionPhase::kWait:
+    case MissionPhase::kArm: return wait_and_arm(p, in, s, in_phase_s);
+    case MissionPhase::kLand:
+      wish = {s.ground_height_m - kBelowGround_m, true, false, true};
+      if (!in.armed) enter(s, MissionPhase::kDone, in.now_ns);
+      else if (standing_long_enough(in, s)) enter(s, MissionPhase::kDisarm, in.now_ns);
+      return wish;
+    case MissionPhase::kDisarm:
+      wish.disarm = true;
+      if (!in.armed) enter(s, MissionPhase::kDone, in.now_ns);
+      return wish;
+    case MissionPhase::kDone:
+    case MissionPhase::kBroken: return wish;
+    default: return fly_leg(p, in, s, in_phase_s);
+  }
+}
+
+const char* name_of(MissionPhase phase) noexcept {
+  switch (phase) {
+    case MissionPhase::kWait: return "waiting for the ground and the autopilot";
+    case MissionPhase::kArm: return "arming";
+    case MissionPhase::kLand: return "landing";
+    case MissionPhase::kDisarm: return "disarming";
+    case MissionPhase::kDone: return "done";
+    case MissionPhase::kBroken: return "broken off";
+    default: return "hover";
+  }
+}
+
+}  // namespace wasp::control

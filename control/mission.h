@@ -1,0 +1,59 @@
+// The mission as a list of heights to hold: arm, take off, hold each height for its time, land, disarm. It asks; the
+// flight mode decides. It arms once, on request, and never again by itself.
+#pragma once
+
+#include <array>
+
+#include "types/time.h"
+
+namespace wasp::control {
+
+struct HoverLeg {
+  float height_m = 0.5f;
+  float seconds = 40.f;
+};
+
+struct MissionParams {
+  static constexpr int kMaxLegs = 8;
+  int leg_count = 0;
+  std::array<HoverLeg, kMaxLegs> legs{};
+  bool follow_recording = false;  ///< replay: arm, hold the height the recording shows, no take-off or landing
+  float recording_seconds = 0.f;  ///< replay: length of the run
+  float patience_s = 20.f;        ///< give up if the autopilot does not arm or the ground is not seen by then
+};
+
+enum class MissionPhase : std::uint8_t { kWait = 0, kArm = 1, kLeg0 = 2, kLand = 20, kDisarm = 21, kDone = 22, kBroken = 23 };
+
+struct MissionInput {
+  TimeNs now_ns = 0;
+  bool armed = false, follows = false, ground_seen = false;
+  float height_m = 0, climb_rate_mps = 0;
+  bool stop_requested = false;
+};
+
+struct MissionState {
+  MissionPhase phase = MissionPhase::kWait;
+  TimeNs since_ns = kNever;         ///< entry into the phase
+  TimeNs settled_since_ns = kNever; ///< on the ground since
+  float ground_height_m = 0;        ///< camera height while standing
+};
+
+/// What the mission wants at this tick.
+struct MissionWish {
+  float target_m = 0;
+  bool armed = false;    ///< ask the autopilot to be armed and to follow
+  bool disarm = false;   ///< ask it to disarm
+  bool rotors = false;   ///< false: zero thrust (standing on the ground)
+};
+
+/// Realtime-safe: yes.
+MissionWish mission_step(const MissionParams& params, const MissionInput& input, MissionState& state) noexcept;
+
+/// Index of the leg a phase stands for, -1 if it is not one.
+constexpr int leg_of(MissionPhase phase) noexcept {
+  const int i = static_cast<int>(phase) - static_cast<int>(MissionPhase::kLeg0);
+  return i >= 0 && i < MissionParams::kMaxLegs ? i : -1;
+}
+const char* name_of(MissionPhase phase) noexcept;
+
+}  // namespace wasp::control

@@ -1,0 +1,33 @@
+#include "messages/frame_encoder.h"
+
+#include "messages/checksum.h"
+
+namespace wasp::mavlink {
+namespace {
+
+/// Length without trailing zeros, at least 1.
+std::size_t trimmed_length(std::span<const std::uint8_t> payload) noexcept {
+  std::size_t n = payload.size();
+  while (n > 1 && payload[n - 1] == 0) --n;
+  return n;
+}
+
+}  // namespace
+
+std::size_t Encoder::write(std::uint32_t id, std::uint8_t crc_extra, std::span<const std::uint8_t> payload,
+                           std::uint8_t incompat_flags, std::span<std::uint8_t> out) WASP_REALTIME {
+  const std::size_t n = trimmed_length(payload);
+  const std::size_t total = kHeaderV2 + n + kChecksumBytes;
+  if (out.size() < total) return 0;
+  const std::array<std::uint8_t, kHeaderV2> header{
+      kStartV2, static_cast<std::uint8_t>(n), incompat_flags, 0, sequence_++, system_id_, component_id_,
+      static_cast<std::uint8_t>(id), static_cast<std::uint8_t>(id >> 8), static_cast<std::uint8_t>(id >> 16)};
+  std::copy(header.begin(), header.end(), out.begin());
+  std::copy(payload.begin(), payload.begin() + static_cast<std::ptrdiff_t>(n), out.begin() + kHeaderV2);
+  const std::uint16_t crc = crc_add(crc_add(kCrcInitial, out.subspan(1, kHeaderV2 - 1 + n)), crc_extra);
+  out[kHeaderV2 + n] = static_cast<std::uint8_t>(crc);
+  out[kHeaderV2 + n + 1] = static_cast<std::uint8_t>(crc >> 8);
+  return total;
+}
+
+}  // namespace wasp::mavlink

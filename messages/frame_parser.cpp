@@ -1,0 +1,142 @@
+#include "messages/frame_parser.h"
+
+#include <cstring>
+
+#include "messages/checksum.h"
+
+namespace wasp::mavlink {
+
+std::size_t Parser::take(std::span<const std::uint8_t> bytes) noexcept {
+  if (head_ > 0) {
+    std::memmove(buffer_.data(), buffer_.data() + head_, available());
+    tail_ -= head_;
+    head_ = 0;
+  }
+  const std::size_t n = std::min(bytes.size(), buffer_.size() - tail_);
+  std::memcpy(buffer_.data() + tail_, bytes.data(), n);
+  tail_ += n;
+  return n;
+}
+
+void Parser::drop(std::size_t n) noexcept {
+  head_ += n;
+  offset_ += n;
+}
+
+void Parser::reset() noexcept {
+  counts_.skipped_bytes += available();
+  drop(available());
+  due_ = offset_;
+}
+
+bool Parser::next(Frame& frame) noexcept {
+  while (available() > 0) {
+    Claim claim;
+    switch (examine(claim)) {
+      case Verdict::kNeedMore:
+        return false;
+      case Verdict::kNotAFrame:
+        ++counts_.skipped_bytes;
+        drop(1);
+        break;
+      case Verdict::kPassOver:
+        drop(claim.total);
+        break;
+      case Verdict::kGood:
+        drop(claim.total);
+        due_ = offset_;
+        frame = claim.frame;
+        return true;
+    }
+  }
+  return false;
+}
+
+/// Fills `claim` from the header `at` bytes behind head_; false if it is not all there yet.
+bool Parser::read_header(std::size_t at, Claim& claim) const noexcept {
+  if (available() <= at) return false;
+  const std::uint8_t* p = buffer_.data() + head_ + at;
+  const bool v2 = p[0] == kStartV2;
+  claim.header = v2 ? kHeaderV2 : kHeaderV1;
+  if (available() < at + claim.header) return false;
+  Frame& f = claim.frame;
+  f.version = v2 ? 2 : 1;
+  f.length = p[1];
+  claim.incompat_flags = v2 ? p[2] : std::uint8_t{0};
+  p += v2 ? 4 : 2;
+  f.sequence = p[0];
+  f.system_id = p[1];
+  f.component_id = p[2];
+  f.message_id = v2 ? p[3] | static_cast<std::uint32_t>(p[4]) << 8 | static_cast<std::uint32_t>(p[5]) << 16 : p[3];
+  f.is_signed = (claim.incompat_flags & kIncompatSigned) != 0;
+  claim.total = claim.header + f.length + kChecksumBytes + (f.is_signed ? kSignatureBytes : 0);
+  return true;
+}
+
+/// Decides on the byte at head_.
+Parser::Verdict Parser::examine(Claim& claim) noexcept {
+  const std::uint8_t start = buffer_[head_];
+  if (start != kStartV1 && start != kStartV2) return Verdict::kNotAFrame;
+  if (!read_header(0, claim)) return Verdict::kNeedMore;
+  if (claim.frame.system_id == 0 || claim.frame.component_id == 0) return refuse_header();
+  if ((claim.incompat_flags & ~kIncompatSigned) != 0)
+    return examine_unverifiable(claim, &Counts::unsupported_flags, &SourceCounts::unsupported_flags);
+  const MessageInfo* info = find_message(claim.frame.message_id);
+  if (info == nullptr) return examine_unverifiable(claim, &Counts::unknown_id, &SourceCounts::unknown_id);
+  if (claim.frame.version == 1 && claim.frame.length != info->min_length) return refuse_header();
+  if (available() < claim.total) return Verdict::kNeedMore;
+  return check(claim, info->crc_extra);
+}
+
+Parser::Verdict Parser::refuse_header() noexcept {
+  if (frame_is_due()) ++counts_.bad_header;
+  return Verdict::kNotAFrame;
+}
+
+/// A frame of unknown id or format. Where none was due it is noise; else it waits for what follows it.
+Parser::Verdict Parser::examine_unverifiable(const Claim& claim, std::uint64_t Counts::*total,
+                                             std::uint64_t SourceCounts::*row) noexcept {
+  if (!frame_is_due()) return Verdict::kNotAFrame;
+  Claim follower;
+  const bool header_there = read_header(claim.total, follower);
+  const bool has_first = available() > claim.total;
+  const std::uint8_t first = has_first ? buffer_[head_ + claim.total] : kStartV2;
+  const bool plausible_first = first == kStartV1 || first == kStartV2;
+  if (plausible_first && !header_there) return Verdict::kNeedMore;
+  SourceCounts* source = sources_.find(claim.frame.system_id, claim.frame.component_id);
+  ++(counts_.*total);
+  if (source != nullptr) {
+    ++(source->*row);
+    ++source->unverified_since_good;
+  }
+  due_ = counted_until_ = offset_ + claim.total;
+  const Frame& f = follower.frame;
+  const bool same_sender = f.system_id == claim.frame.system_id && f.component_id == claim.frame.component_id;
+  const bool follows = plausible_first && (follower.incompat_flags & ~kIncompatSigned) == 0 &&
+                       (same_sender || sources_.find(f.system_id, f.component_id) != nullptr);
+  return follows ? Verdict::kPassOver : Verdict::kNotAFrame;
+}
+
+/// The whole frame is there: its checksum decides.
+Parser::Verdict Parser::check(Claim& claim, std::uint8_t crc_extra) noexcept {
+  const std::span<const std::uint8_t> wire(buffer_.data() + head_, claim.total);
+  Frame& f = claim.frame;
+  const std::size_t end = claim.header + f.length;
+  const std::uint16_t crc = crc_add(crc_add(kCrcInitial, wire.subspan(1, end - 1)), crc_extra);
+  if (crc != (wire[end] | wire[end + 1] << 8)) {
+    if (offset_ < counted_until_) return Verdict::kNotAFrame;
+    ++counts_.bad_crc;
+    if (SourceCounts* source = sources_.find(f.system_id, f.component_id)) ++source->bad_crc;
+    due_ = offset_ + claim.total;
+    return Verdict::kNotAFrame;
+  }
+  f.wire = wire;
+  f.payload = wire.data() + claim.header;
+  if (f.is_signed) f.signature = wire.last(kSignatureBytes);
+  ++counts_.good;
+  counts_.signed_frames += f.is_signed ? 1 : 0;
+  counts_.sequence_lost += sources_.add_good(f.system_id, f.component_id, f.sequence, counts_.untracked_sources);
+  return Verdict::kGood;
+}
+
+}  // namespace wasp::mavlink

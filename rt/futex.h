@@ -1,0 +1,55 @@
+// Sleep and wake on a 32-bit word that may lie in memory shared between processes.
+#pragma once
+
+#include <linux/futex.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <climits>
+#include <cstdint>
+
+#include "rt/clock.h"
+
+namespace wasp::rt {
+
+/// Sleeps while `*word == expected`, until woken, interrupted, or `deadline_ns` (CLOCK_MONOTONIC) has passed.
+/// Spurious returns are allowed: the caller looks again. Realtime-safe: yes (futex).
+inline void futex_wait_until(const std::atomic<std::uint32_t>* word, std::uint32_t expected,
+                             TimeNs deadline_ns) WASP_REALTIME {
+  const timespec ts = to_timespec(deadline_ns);
+  syscall(SYS_futex, word, FUTEX_WAIT_BITSET, expected, &ts, nullptr, FUTEX_BITSET_MATCH_ANY);
+}
+
+/// Wakes every sleeper. Realtime-safe: yes (futex).
+inline void futex_wake_all(std::atomic<std::uint32_t>* word) WASP_REALTIME {
+  syscall(SYS_futex, word, FUTEX_WAKE, INT_MAX, nullptr, nullptr, 0);
+}
+
+/// A doorbell: `ring` after publishing, `wait` for a change. Rings cost no system call while nobody sleeps.
+/// A sleeper that dies leaves the count raised: later rings make one needless system call, nothing else.
+struct alignas(64) Bell {
+  std::atomic<std::uint32_t> word{0};
+  std::atomic<std::uint32_t> sleepers{0};
+
+  /// Realtime-safe: yes.
+  void ring() WASP_REALTIME {
+    word.fetch_add(1, std::memory_order_seq_cst);
+    if (sleepers.load(std::memory_order_seq_cst) != 0) futex_wake_all(&word);
+  }
+  /// Sleeps until `ready()` or the deadline; returns the last `ready()`. Realtime-safe: yes if `ready` is.
+  template <class Ready>
+  bool wait(Ready&& ready, TimeNs deadline_ns) WASP_REALTIME {
+    for (;;) {
+      const std::uint32_t seen = word.load(std::memory_order_seq_cst);
+      if (ready()) return true;
+      if (now() >= deadline_ns) return false;
+      sleepers.fetch_add(1, std::memory_order_seq_cst);
+      if (word.load(std::memory_order_seq_cst) == seen) futex_wait_until(&word, seen, deadline_ns);
+      sleepers.fetch_sub(1, std::memory_order_relaxed);
+    }
+  }
+};
+static_assert(sizeof(Bell) == 64);
+
+}  // namespace wasp::rt

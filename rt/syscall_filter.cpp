@@ -1,0 +1,64 @@
+#include "rt/syscall_filter.h"
+
+#include <linux/audit.h>
+#include <linux/filter.h>
+#include <linux/seccomp.h>
+#include <sys/prctl.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <cstddef>
+#include <iterator>
+#include <vector>
+
+namespace wasp::rt {
+namespace {
+
+constexpr long kAllowed[] = {
+    SYS_futex,
+    SYS_clock_nanosleep,
+    SYS_clock_gettime,
+    SYS_read,
+    SYS_write,
+    SYS_ppoll,
+    SYS_ioctl,
+    SYS_getrusage,
+#ifdef SYS_poll
+    SYS_poll,
+#endif
+#ifdef SYS_open
+    SYS_open,
+#endif
+    // reopening a lost line, and leaving: the C library's own work at thread exit
+    SYS_openat,
+    SYS_close,
+    SYS_dup3,
+    SYS_fcntl,
+    SYS_exit,
+    SYS_exit_group,
+    SYS_munmap,
+    SYS_madvise,
+    SYS_rt_sigprocmask,
+    SYS_rt_sigreturn,
+    SYS_set_robust_list,
+    SYS_restart_syscall,
+    SYS_gettid,
+    SYS_tgkill,
+    SYS_getpid,
+};
+
+}  // namespace
+
+bool restrict_thread_syscalls() {
+  std::vector<sock_filter> program;
+  program.push_back(BPF_STMT(BPF_LD | BPF_W | BPF_ABS, static_cast<unsigned>(offsetof(seccomp_data, nr))));
+  for (const long number : kAllowed) {
+    program.push_back(BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, static_cast<unsigned>(number), 0, 1));
+    program.push_back(BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ALLOW));
+  }
+  program.push_back(BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_KILL_PROCESS));
+  const sock_fprog filter{static_cast<unsigned short>(program.size()), program.data()};
+  return prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) == 0 && prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, &filter) == 0;
+}
+
+}  // namespace wasp::rt

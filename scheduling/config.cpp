@@ -1,0 +1,146 @@
+#include "scheduling/config.h"
+
+#include <algorithm>
+
+namespace wasp::scheduling {
+namespace {
+
+void read_milliseconds(TomlTable& t, const char* key, DurationNs& out) {
+  double ms = static_cast<double>(out) / kMillisecond;
+  t.number(key, ms, 1, 60'000);
+  out = static_cast<DurationNs>(ms * kMillisecond);
+}
+
+void read_microseconds(TomlTable& t, const char* key, DurationNs& out) {
+  double us = static_cast<double>(out) / kMicrosecond;
+  t.number(key, us, 1, 1'000'000);
+  out = static_cast<DurationNs>(us * kMicrosecond);
+}
+
+void read_thread(TomlTable& t, ThreadRow& row) {
+  t.number("core", row.core, -1, 1023);
+  t.number("priority", row.priority, 1, 99);
+  read_microseconds(t, "budget_us", row.budget_ns);
+}
+
+void read_run(TomlTable t, Config& c) {
+  t.flag("enforce_real_time", c.enforce_real_time);
+  t.flag("strict_syscalls", c.strict_syscalls);
+  t.number("heap_mib", c.heap_mib, 1, 4096);
+  t.finish();
+}
+
+void read_autopilot(TomlTable t, Config& c) {
+  t.text_value("endpoint", c.endpoint);
+  t.text_value("flavour", c.flavour, {"wasp"});
+  t.number("system_id", c.system_id, 1, 255);
+  t.number("component_id", c.component_id, 1, 255);
+  t.number("follow_mode", c.follow_mode, 0, 4294967295.0);
+  t.finish();
+}
+
+void read_camera(TomlTable t, Config& c) {
+  t.text_value("driver", c.camera_driver, {"sim", "replay"});
+  Intrinsics& k = c.camera.intrinsics;
+  t.number("width_px", k.width_px, 16, 8192);
+  t.number("height_px", k.height_px, 16, 8192);
+  t.number("fx_px", k.fx_px, 1, 1e5);
+  t.number("fy_px", k.fy_px, 1, 1e5);
+  t.number("cx_px", k.cx_px, -1e4, 1e5);
+  t.number("cy_px", k.cy_px, -1e4, 1e5);
+  t.number("pitch_down_deg", c.camera_pitch_down_deg, -90, 90);
+  c.camera.R_body_cam = R_body_cam_from_pitch_down(to_radians(Degrees{c.camera_pitch_down_deg}));
+  std::vector<double> position;
+  t.numbers("position_body_m", position, -10, 10);
+  if (!position.empty() && position.size() != 3) throw ConfigError("camera.position_body_m needs three numbers");
+  for (std::size_t i = 0; i < position.size(); ++i) c.camera.position_body_m[static_cast<Eigen::Index>(i)] = static_cast<float>(position[i]);
+  t.finish();
+}
+
+void read_mission(TomlTable t, control::MissionParams& m) {
+  std::vector<double> heights, seconds;
+  t.numbers("heights_m", heights, 0.3, 4.0);
+  t.numbers("seconds", seconds, 1, 36'000);
+  t.number("patience_s", m.patience_s, 1, 600);
+  t.finish();
+  if (heights.empty() && seconds.empty()) return;
+  if (heights.size() != seconds.size() || heights.size() > control::MissionParams::kMaxLegs)
+    throw ConfigError("mission.heights_m and mission.seconds must have the same length, 1 to 8");
+  m.leg_count = static_cast<int>(heights.size());
+  for (std::size_t i = 0; i < heights.size(); ++i) m.legs[i] = {static_cast<float>(heights[i]), static_cast<float>(seconds[i])};
+}
+
+void read_control(TomlTable t, Config& c) {
+  double rate_hz = static_cast<double>(kSecond) / static_cast<double>(c.control_period_ns);
+  t.number("rate_hz", rate_hz, 5, 200);
+  c.control_period_ns = static_cast<DurationNs>(static_cast<double>(kSecond) / rate_hz);
+  read_microseconds(t, "deadline_us", c.control_deadline_ns);
+  read_milliseconds(t, "attitude_age_limit_ms", c.control.attitude_age_limit_ns);
+  read_milliseconds(t, "link_age_limit_ms", c.control.link_age_limit_ns);
+  read_milliseconds(t, "ground_hold_limit_ms", c.control.ground_hold_limit_ns);
+  std::string action = c.control.failsafe_action == control::FailsafeAction::kDescend ? "descend" : "stop_stream";
+  t.text_value("failsafe_action", action, {"descend", "stop_stream"});
+  c.control.failsafe_action = action == "descend" ? control::FailsafeAction::kDescend : control::FailsafeAction::kStopStream;
+  t.number("failsafe_thrust_share", c.control.failsafe_thrust_share, 0.5, 1.0);
+  auto& hold = c.control.altitude_hold;
+  t.number("mass_kg", hold.mass_kg, 0.05, 50);
+  t.number("full_thrust_n", hold.full_thrust_n, 0.5, 2000);
+  t.number("kp_npm", hold.kp_npm, 0, 1000);
+  t.number("ki_npms", hold.ki_npms, 0, 1000);
+  t.number("kd_nspm", hold.kd_nspm, 0, 1000);
+  t.number("max_climb_mps", hold.max_climb_mps, 0.05, 5);
+  double tilt_deg = to_degrees(Radians{static_cast<double>(c.control.limits.max_tilt_rad)}).value;
+  t.number("max_tilt_deg", tilt_deg, 1, 45);
+  c.control.limits.max_tilt_rad = static_cast<float>(to_radians(Degrees{tilt_deg}).value);
+  t.finish();
+  if (hold.mass_kg * 9.81f > 0.95f * hold.full_thrust_n) throw ConfigError("control: the vehicle is too heavy for its thrust");
+}
+
+void read_behaviours(TomlTable t, Config& c) {
+  for (std::size_t i = 0; i < c.behaviours.size(); ++i) {
+    TomlTable b = t.table(c.behaviours[i].name.c_str());
+    control::ArbiterRow& row = c.control.arbiter.rows[i];
+    read_thread(b, c.behaviours[i]);
+    read_milliseconds(b, "age_limit_ms", row.age_limit_ns);
+    b.number("height_rank", row.height_rank, -1, 15);
+    b.number("heading_weight", row.heading_weight, 0, 100);
+    b.number("pitch_weight", row.pitch_weight, 0, 100);
+    b.finish();
+  }
+  t.finish();
+}
+
+void read_file(const std::string& path, Config& c) {
+  TomlTable root = TomlTable::parse_file(path);
+  read_run(root.table("run"), c);
+  read_autopilot(root.table("autopilot"), c);
+  read_camera(root.table("camera"), c);
+  read_mission(root.table("mission"), c.control.mission);
+  read_control(root.table("control"), c);
+  TomlTable threads = root.table("threads");
+  for (ThreadRow* row : {&c.control_thread, &c.link_thread, &c.camera_thread}) {
+    TomlTable t = threads.table(row->name.c_str());
+    read_thread(t, *row);
+    t.finish();
+  }
+  threads.finish();
+  read_behaviours(root.table("behaviour"), c);
+  root.finish();
+}
+
+}  // namespace
+
+Config load_config(const std::vector<std::string>& paths, const std::vector<std::string>& behaviour_names) {
+  Config config;
+  if (behaviour_names.size() > control::kMaxBehaviours) throw ConfigError("too many behaviours");
+  for (const auto& name : behaviour_names) config.behaviours.push_back({name, 1, 50, 4 * kMillisecond});
+  config.control.arbiter.behaviour_count = static_cast<int>(behaviour_names.size());
+  for (const auto& path : paths) read_file(path, config);
+  if (config.control.mission.leg_count == 0) {
+    config.control.mission.leg_count = 2;
+    config.control.mission.legs = {control::HoverLeg{0.5f, 40.f}, control::HoverLeg{1.0f, 40.f}};
+  }
+  return config;
+}
+
+}  // namespace wasp::scheduling

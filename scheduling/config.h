@@ -1,0 +1,50 @@
+// The configuration of a flight process: what config/wasp.toml says, checked.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "control/control_step.h"
+#include "rt/thread.h"
+#include "scheduling/toml_table.h"
+#include "types/camera.h"
+
+namespace wasp::scheduling {
+
+/// One row of the thread table.
+struct ThreadRow {
+  std::string name;
+  int core = 1;
+  int priority = 50;
+  DurationNs budget_ns = 4 * kMillisecond;
+};
+
+struct Config {
+  bool enforce_real_time = true;
+  bool strict_syscalls = false;
+  int heap_mib = 64;
+
+  std::string endpoint = "serial:/dev/ttyUSB0:921600";
+  std::string flavour = "wasp";
+  int system_id = 1, component_id = 191;
+  int follow_mode = 1;
+
+  std::string camera_driver = "sim";
+  CameraGeometry camera;
+  double camera_pitch_down_deg = 30.0;
+
+  DurationNs control_period_ns = 50 * kMillisecond;
+  DurationNs control_deadline_ns = 10 * kMillisecond;
+  control::ControlParams control;
+
+  ThreadRow control_thread{"control", 1, 80, 2 * kMillisecond};
+  ThreadRow link_thread{"link", 1, 70, 1 * kMillisecond};
+  ThreadRow camera_thread{"camera", 1, 60, 5 * kMillisecond};
+  std::vector<ThreadRow> behaviours;  ///< index = Cue::behaviour
+};
+
+/// Reads `paths` in order, later ones override single keys. `behaviour_names` are the behaviours this program has, in
+/// order; a section for any other is an error. Throws ConfigError naming file, line and value.
+Config load_config(const std::vector<std::string>& paths, const std::vector<std::string>& behaviour_names);
+
+}  // namespace wasp::scheduling

@@ -1,0 +1,75 @@
+// The control thread: every period on the grid it gathers cues, attitude and acceleration, runs control_step, and hands
+// the command to the serial line in one write. It waits for nobody; what is not there is absent. Heartbeat, TIMESYNC
+// requests and arming go out from here too, so that one thread owns what the autopilot hears.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "control/control_step.h"
+#include "drivers/autopilot_link.h"
+#include "drivers/serial_port.h"
+#include "rt/periodic.h"
+#include "rt/seqlock.h"
+#include "scheduling/config.h"
+#include "scheduling/events.h"
+#include "scheduling/realtime_loop.h"
+#include "shm/broadcast_ring.h"
+
+namespace wasp::scheduling {
+
+/// What the link thread tells the control thread of the autopilot.
+struct LinkReport {
+  TimeNs heard_at_ns = kNever;
+  std::uint32_t armed = 0;
+  std::uint32_t custom_mode = 0;
+};
+
+struct ControlWiring {
+  const shm::Region* flight = nullptr;
+  StageTable* stages = nullptr;
+  const rt::Seqlock<LinkReport>* link = nullptr;
+  drivers::SerialPort* port = nullptr;
+  drivers::AutopilotLink* autopilot = nullptr;
+  EventQueue* events = nullptr;
+  bool link_attitude_is_vehicle = true;
+};
+
+class ControlLoop {
+ public:
+  ControlLoop(const Config& config, const ControlWiring& wiring);
+  /// Runs until the mission is over or the stop flag. Real-time loop.
+  void run(LoopControl& control);
+  [[nodiscard]] bool mission_over() const noexcept { return mission_over_.load(); }
+
+ private:
+  struct BehaviourStages {
+    Stage* age = nullptr;
+    Stage* end_to_end = nullptr;
+  };
+  void tick(const rt::Release& release, LoopControl& control) WASP_REALTIME;
+  void gather(control::ControlInput& input) WASP_REALTIME;
+  void mean_acceleration(control::ControlInput& input) WASP_REALTIME;
+  void send(const control::ControlOutput& output, Command& command, TimeNs now_ns) WASP_REALTIME;
+  std::size_t append_requests(const control::ControlOutput& output, std::size_t used, TimeNs now_ns) WASP_REALTIME;
+  void account(const control::ControlInput& input, Command& command, LoopControl& control) WASP_REALTIME;
+  void announce(const Command& command) WASP_REALTIME;
+
+  Config config_;
+  ControlWiring wiring_;
+  control::ControlState state_;
+  std::vector<shm::RingReader> cues_;
+  shm::RingReader attitude_, imu_;
+  shm::RingWriter commands_;
+  std::vector<BehaviourStages> behaviour_stages_;
+  Stage *wake_, *compute_, *write_, *tick_to_byte_;
+  std::array<std::uint8_t, 1024> out_{};
+  std::array<TimeNs, control::kMaxBehaviours> last_exposed_{};
+  TimeNs heartbeat_due_ns_ = 0, timesync_due_ns_ = 0, request_due_ns_ = 0;
+  int consecutive_misses_ = 0;
+  FlightMode announced_mode_ = FlightMode::kDisarmed;
+  std::uint8_t announced_phase_ = 255;
+  std::atomic<bool> mission_over_{false};
+};
+
+}  // namespace wasp::scheduling

@@ -1,0 +1,39 @@
+// Short texts from real-time threads to the log: queued without waiting, printed by the main thread.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <string_view>
+
+#include "rt/spsc_queue.h"
+#include "types/time.h"
+
+namespace wasp::scheduling {
+
+struct Event {
+  TimeNs at_ns = 0;
+  std::array<char, 88> text{};
+};
+
+/// One producer (a real-time thread), one consumer (the main thread). A full queue drops the event and counts it.
+class EventQueue {
+ public:
+  /// Realtime-safe: yes.
+  void say(TimeNs at_ns, std::string_view head, std::string_view tail = {}) WASP_REALTIME {
+    Event e;
+    e.at_ns = at_ns;
+    const std::size_t n = std::min(head.size(), e.text.size() - 1);
+    std::memcpy(e.text.data(), head.data(), n);
+    std::memcpy(e.text.data() + n, tail.data(), std::min(tail.size(), e.text.size() - 1 - n));
+    if (!queue_.push(e)) ++dropped_;
+  }
+  bool take(Event& e) noexcept { return queue_.pop(e); }
+  [[nodiscard]] std::uint64_t dropped() const noexcept { return dropped_; }
+
+ private:
+  rt::SpscQueue<Event, 64> queue_;
+  std::uint64_t dropped_ = 0;
+};
+
+}  // namespace wasp::scheduling

@@ -1,0 +1,36 @@
+// The flying process: config -> shared memory -> drivers -> thread table -> run -> land -> say what happened.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "scheduling/behaviour_loop.h"
+#include "scheduling/config.h"
+
+namespace wasp::scheduling {
+
+/// One behaviour as the flight process knows it; made by behaviour_row.
+struct BehaviourRow {
+  std::string name;
+  Stream stream;
+  /// Builds the adaptor (before arming); the result is the body of its thread.
+  std::function<std::function<void(LoopControl&)>(const CameraGeometry&, const BehaviourWiring&)> make;
+};
+using BehaviourTable = std::vector<BehaviourRow>;
+
+template <Behaviour B>
+BehaviourRow behaviour_row() {
+  return {std::string(B::kName), B::kStream, [](const CameraGeometry& camera, const BehaviourWiring& wiring) {
+            typename B::Params params;
+            params.camera = camera;
+            auto loop = std::make_shared<BehaviourLoop<B>>(params, wiring);
+            return [loop](LoopControl& control) { loop->run(control); };
+          }};
+}
+
+/// `wasp flight`: parses its command line and flies. Exit code 0: flown to its end or stopped in order; 1: broken off or
+/// an error, said on standard error; 2: bad arguments.
+int flight_main(const BehaviourTable& behaviours, int argc, char** argv);
+
+}  // namespace wasp::scheduling

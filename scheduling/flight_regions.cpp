@@ -1,0 +1,60 @@
+#include "scheduling/flight_regions.h"
+
+#include <new>
+#include <stdexcept>
+
+#include "rt/clock.h"
+#include "shm/topics.h"
+#include "types/messages.h"
+
+namespace wasp::scheduling {
+namespace {
+
+using shm::TopicKind;
+
+std::byte* block(const shm::Region& region, const char* topic, const char* type) {
+  return region.at(region.topic(topic, type).offset);
+}
+
+}  // namespace
+
+shm::Region create_flight_region(const std::string& instance, const std::vector<std::string>& behaviours, bool real_time) {
+  std::vector<shm::TopicSpec> specs{
+      {shm::kImu, "Imu", TopicKind::kRing, shm::kImuSlots, sizeof(ImuSample)},
+      {shm::kAttitude, "Attitude", TopicKind::kRing, shm::kAttitudeSlots, sizeof(AttitudeSample)},
+      {shm::kCommand, "Command", TopicKind::kRing, shm::kCommandSlots, sizeof(Command)},
+      {shm::kStages, "StageTable", TopicKind::kBlock, 1, sizeof(StageTable)},
+      {"run", "RunStatus", TopicKind::kBlock, 1, sizeof(RunStatus)},
+  };
+  for (const auto& name : behaviours) specs.push_back({shm::cue_topic(name), "Cue", TopicKind::kRing, shm::kCueSlots, sizeof(Cue)});
+  shm::Region region = shm::Region::create(shm::flight_region(instance), specs, real_time ? "real time" : "NOT REAL TIME");
+  new (block(region, shm::kStages, "StageTable")) StageTable;
+  auto* status = new (block(region, "run", "RunStatus")) RunStatus;
+  status->real_time = real_time ? 1 : 0;
+  for (std::size_t i = 0; i < behaviours.size() && i < status->behaviours.size(); ++i)
+    std::copy_n(behaviours[i].begin(), std::min<std::size_t>(behaviours[i].size(), 31), status->behaviours[i].begin());
+  status->behaviour_count = static_cast<std::uint32_t>(behaviours.size());
+  return region;
+}
+
+StageTable& stage_table(const shm::Region& flight) {
+  return *std::launder(reinterpret_cast<StageTable*>(block(flight, shm::kStages, "StageTable")));
+}
+
+RunStatus& run_status(const shm::Region& flight) {
+  return *std::launder(reinterpret_cast<RunStatus*>(block(flight, "run", "RunStatus")));
+}
+
+shm::Region attach_camera(const std::string& instance, double patience_s, const std::function<bool()>& cancelled) {
+  const TimeNs deadline = rt::now() + from_seconds(patience_s);
+  for (;;) {
+    try {
+      return shm::Region::attach_with_bells(shm::camera_region(instance));
+    } catch (const std::exception& e) {
+      if (cancelled() || rt::now() >= deadline) throw std::runtime_error(std::string("no camera: ") + e.what());
+    }
+    rt::sleep_until(rt::now() + 20 * kMillisecond);
+  }
+}
+
+}  // namespace wasp::scheduling

@@ -1,0 +1,24 @@
+// The regions a flight process writes and reads.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "scheduling/stage_table.h"
+#include "shm/region.h"
+
+namespace wasp::scheduling {
+
+/// Creates wasp.<instance>.flight with imu, attitude, command, one cue topic per behaviour, stages and run. A region
+/// left by a crashed flight is taken over with its history; its counters start anew.
+shm::Region create_flight_region(const std::string& instance, const std::vector<std::string>& behaviours, bool real_time);
+
+StageTable& stage_table(const shm::Region& flight);
+RunStatus& run_status(const shm::Region& flight);
+
+/// Waits for wasp.<instance>.camera, written by another process, to offer the streams. Throws std::runtime_error after
+/// `patience_s`, or as soon as `cancelled` says so.
+shm::Region attach_camera(const std::string& instance, double patience_s, const std::function<bool()>& cancelled);
+
+}  // namespace wasp::scheduling

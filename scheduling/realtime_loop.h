@@ -1,0 +1,55 @@
+// What every real-time loop shares: the arming mark, the fault count, the optional system-call filter, the stop flag.
+#pragma once
+
+#include <atomic>
+
+#include "rt/contract.h"
+#include "rt/syscall_filter.h"
+#include "rt/thread_faults.h"
+#include "scheduling/stage_table.h"
+
+namespace wasp::scheduling {
+
+/// State shared by all loops of one flight process.
+struct LoopControl {
+  std::atomic<bool> stop{false};            ///< end all loops
+  std::atomic<bool> stop_requested{false};  ///< land in order, then end
+  std::atomic<bool> realtime_started{false};///< set once every thread stands: faults count from here
+  bool strict_syscalls = false;
+  RunStatus* status = nullptr;
+};
+
+/// Lives for the duration of a loop on its own thread. Counts page faults from the first `tick()` after the start of
+/// real time, adds them to the run status at the end.
+class RealtimeLoop {
+ public:
+  explicit RealtimeLoop(LoopControl& control) : control_(control) {
+    if (control.strict_syscalls) rt::restrict_thread_syscalls();
+  }
+  ~RealtimeLoop() { add_faults(); }
+  RealtimeLoop(const RealtimeLoop&) = delete;
+  RealtimeLoop& operator=(const RealtimeLoop&) = delete;
+
+  /// Once a cycle; false when the loop must end. Realtime-safe: yes.
+  bool tick() WASP_REALTIME {
+    if (!marked_ && control_.realtime_started.load(std::memory_order_relaxed)) {
+      marked_ = true;
+      at_start_ = rt::thread_faults();
+    }
+    return !control_.stop.load(std::memory_order_relaxed);
+  }
+
+ private:
+  void add_faults() noexcept {
+    if (!marked_ || control_.status == nullptr) return;
+    const rt::FaultCount now = rt::thread_faults();
+    control_.status->minor_faults.fetch_add(static_cast<std::uint64_t>(now.minor - at_start_.minor));
+    control_.status->major_faults.fetch_add(static_cast<std::uint64_t>(now.major - at_start_.major));
+  }
+  LoopControl& control_;
+  rt::FaultCount at_start_;
+  bool marked_ = false;
+  rt::RealtimeSection section_;
+};
+
+}  // namespace wasp::scheduling

@@ -1,0 +1,138 @@
+#include "scheduling/replay_camera.h"
+
+#include <cstring>
+
+#include "rt/clock.h"
+#include "shm/topics.h"
+#include "types/messages.h"
+
+namespace wasp::scheduling {
+namespace {
+
+constexpr std::uint64_t kMaxBehind = 4;  // of kFrameSlots: the slot under a reader is never the next to be written
+constexpr DurationNs kPatience = 20 * kSecond;
+
+void write_frame(shm::RingWriter& ring, const void* pixels, drivers::Recording::Size size, std::uint32_t pixel_bytes,
+                 PixelFormat format, std::uint32_t sequence, TimeNs exposed_at_ns) WASP_REALTIME {
+  std::byte* slot = ring.loan();
+  FrameHeader header;
+  header.exposed_at_ns = exposed_at_ns;
+  header.sequence = sequence;
+  header.format = format;
+  header.width_px = static_cast<std::uint32_t>(size.width_px);
+  header.height_px = static_cast<std::uint32_t>(size.height_px);
+  header.stride_bytes = header.width_px * pixel_bytes;
+  std::memcpy(slot, &header, sizeof header);
+  std::memcpy(slot + kFramePixelOffset, pixels, size.pixels() * pixel_bytes);
+  ring.publish(rt::now());
+}
+
+}  // namespace
+
+std::vector<shm::TopicSpec> ReplayCamera::topics(const drivers::Recording& r) {
+  std::vector<shm::TopicSpec> specs;
+  const auto bytes = [](drivers::Recording::Size size, std::size_t pixel_bytes) { return kFramePixelOffset + std::max<std::size_t>(64, size.pixels() * pixel_bytes); };
+  specs.push_back({shm::kDepth, "Frame", shm::TopicKind::kRing, shm::kFrameSlots, bytes(r.depth_size(), 2)});
+  specs.push_back({shm::kGray, "Frame", shm::TopicKind::kRing, shm::kFrameSlots, bytes(r.gray_size(), 1)});
+  return specs;
+}
+
+ReplayCamera::ReplayCamera(drivers::Recording recording, const shm::Region& camera, DurationNs length_ns, StageTable& stages)
+    : recording_(std::move(recording)),
+      length_ns_(length_ns),
+      depth_(std::make_unique<shm::RingWriter>(camera, shm::kDepth, "Frame")),
+      gray_(std::make_unique<shm::RingWriter>(camera, shm::kGray, "Frame")),
+      pool_(recording_.depth_size().pixels(), recording_.gray_size().pixels()),
+      release_(stages.add("camera", "release", 0)) {}
+
+std::atomic<std::uint64_t>* ReplayCamera::add_reader(bool depth) {
+  readers_.push_back(std::make_unique<Reader>());
+  readers_.back()->depth = depth;
+  return &readers_.back()->done;
+}
+
+bool ReplayCamera::decode_one(std::size_t index, DurationNs offset_ns, std::uint32_t sequence, DecodedFrame& frame) {
+  const auto& entry = recording_.entries()[index];
+  try {
+    frame.has_depth = entry.has_depth();
+    frame.has_gray = entry.has_gray();
+    if (frame.has_depth) recording_.load_depth(index, frame.depth_mm);
+    if (frame.has_gray) recording_.load_gray(index, frame.gray);
+  } catch (const std::exception&) {
+    decode_errors_.fetch_add(1);
+    return false;
+  }
+  frame.offset_ns = offset_ns;
+  frame.sequence = sequence;
+  return true;
+}
+
+DurationNs ReplayCamera::lap_ns(const drivers::Recording& recording) {
+  return recording.entries().back().offset_ns + from_seconds(1.0 / recording.nominal_rate_hz());
+}
+
+void ReplayCamera::decode(LoopControl& control) {
+  const auto& entries = recording_.entries();
+  const std::uint32_t lap_sequence = entries.back().sequence + 1;
+  std::uint32_t slot = 0;
+  bool holding = false, any = true;
+  for (std::uint32_t lap = 0; any && !control.stop; ++lap) {
+    any = false;
+    for (std::size_t i = 0; i < entries.size() && !control.stop; ++i) {
+      const DurationNs offset_ns = lap * lap_ns(recording_) + entries[i].offset_ns;
+      if (offset_ns >= length_ns_) {
+        all_decoded_ = true;
+        return;
+      }
+      while (!holding && !(holding = pool_.take_empty(slot)) && !control.stop) rt::sleep_until(rt::now() + 2 * kMillisecond);
+      if (!holding || !decode_one(i, offset_ns, lap * lap_sequence + entries[i].sequence, pool_.frame(slot))) continue;
+      pool_.give_full(slot);
+      holding = false;
+      any = true;
+    }
+  }
+  all_decoded_ = true;
+}
+
+bool ReplayCamera::readers_keep_up() const noexcept {
+  for (const auto& r : readers_) {
+    const std::uint64_t newest = (r->depth ? depth_ : gray_)->published();
+    if (newest - r->done.load(std::memory_order_acquire) >= kMaxBehind) return false;
+  }
+  return true;
+}
+
+void ReplayCamera::publish(const DecodedFrame& frame, TimeNs exposed_at_ns) WASP_REALTIME {
+  if (frame.has_depth)
+    write_frame(*depth_, frame.depth_mm.data(), recording_.depth_size(), 2, PixelFormat::kDepth16Mm, frame.sequence, exposed_at_ns);
+  if (frame.has_gray)
+    write_frame(*gray_, frame.gray.data(), recording_.gray_size(), 1, PixelFormat::kMono8, frame.sequence, exposed_at_ns);
+}
+
+void ReplayCamera::run(LoopControl& control) {
+  RealtimeLoop loop(control);
+  TimeNs start_ns = kNever;
+  while (loop.tick()) {
+    std::uint32_t slot = 0;
+    if (!control.realtime_started.load(std::memory_order_relaxed) || !pool_.take_full(slot)) {
+      if (all_decoded_.load() && start_ns != kNever) break;
+      rt::sleep_until(rt::now() + kMillisecond);
+      continue;
+    }
+    const DecodedFrame& frame = pool_.frame(slot);
+    if (start_ns == kNever) start_ns = rt::now() + 50 * kMillisecond;
+    const TimeNs due_ns = start_ns + frame.offset_ns;
+    rt::sleep_until(due_ns);
+    if (!readers_keep_up()) held_back_.fetch_add(1, std::memory_order_relaxed);
+    for (const TimeNs limit = rt::now() + kPatience; !readers_keep_up() && rt::now() < limit && loop.tick();)
+      rt::sleep_until(rt::now() + kMillisecond);
+    const TimeNs now_ns = rt::now();
+    publish(frame, now_ns);
+    release_->record(now_ns - due_ns);
+    published_.fetch_add(1, std::memory_order_relaxed);
+    pool_.give_empty(slot);
+  }
+  finished_ = true;
+}
+
+}  // namespace wasp::scheduling

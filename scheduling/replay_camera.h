@@ -1,0 +1,63 @@
+// The replay camera: an ordinary thread decodes ahead, a real-time thread loans ring slots and publishes each frame at
+// its recorded time, so that behaviours see a camera. Should a behaviour fall several frames behind (a stalled host), the
+// camera holds the next frame back and counts it: a replay loses nothing.
+#pragma once
+
+#include <algorithm>
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "drivers/recording.h"
+#include "scheduling/frame_pool.h"
+#include "scheduling/realtime_loop.h"
+#include "shm/broadcast_ring.h"
+
+namespace wasp::scheduling {
+
+class ReplayCamera {
+ public:
+  /// `camera` is the region this process writes; it has a topic for each stream the recording has.
+  ReplayCamera(drivers::Recording recording, const shm::Region& camera, DurationNs length_ns, StageTable& stages);
+
+  /// Rings a recording needs, for Region::create.
+  static std::vector<shm::TopicSpec> topics(const drivers::Recording& recording);
+
+  /// Length of one pass over the recording.
+  static DurationNs lap_ns(const drivers::Recording& recording);
+
+  /// A behaviour that must not lose frames: number of its stream's newest frame it has finished with.
+  std::atomic<std::uint64_t>* add_reader(bool depth);
+
+  /// Decodes ahead until the stop flag or the end. Ordinary thread.
+  void decode(LoopControl& control);
+  /// Publishes until the stop flag or the end. Real-time loop.
+  void run(LoopControl& control);
+
+  [[nodiscard]] bool finished() const noexcept { return finished_.load(); }
+  [[nodiscard]] std::uint64_t published() const noexcept { return published_.load(); }
+  [[nodiscard]] std::uint64_t held_back() const noexcept { return held_back_.load(); }
+  [[nodiscard]] std::uint64_t decode_errors() const noexcept { return decode_errors_.load(); }
+
+ private:
+  struct Reader {
+    bool depth = false;
+    std::atomic<std::uint64_t> done{0};
+  };
+  bool decode_one(std::size_t index, DurationNs offset_ns, std::uint32_t sequence, DecodedFrame& frame);
+  void publish(const DecodedFrame& frame, TimeNs exposed_at_ns) WASP_REALTIME;
+  [[nodiscard]] bool readers_keep_up() const noexcept;
+
+  drivers::Recording recording_;
+  DurationNs length_ns_;
+  std::unique_ptr<shm::RingWriter> depth_, gray_;
+  FramePool pool_;
+  std::vector<std::unique_ptr<Reader>> readers_;
+  Stage* release_;
+  std::atomic<bool> all_decoded_{false}, finished_{false};
+  std::atomic<std::uint64_t> published_{0}, held_back_{0}, decode_errors_{0};
+};
+
+}  // namespace wasp::scheduling

@@ -1,0 +1,29 @@
+// What the behaviours were given when a recording was made: for each behaviour, the frames it stepped on and the exact
+// attitude. Replaying with it gives the same cues to the bit, whatever the timing of the replay.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "types/messages.h"
+
+namespace wasp::scheduling {
+
+struct ScriptedStep {
+  std::uint32_t frame_sequence = 0;
+  bool attitude_valid = false;
+  AttitudeSample attitude;
+};
+
+/// Steps of one behaviour in order of frames.
+using BehaviourScript = std::vector<ScriptedStep>;
+
+/// Reads `folder`/cues.csv as wasp-record writes it. Empty if the file is absent. Throws std::runtime_error naming file
+/// and line if it is malformed.
+std::map<std::string, BehaviourScript> load_replay_script(const std::string& folder);
+
+/// Step for a frame, nullptr if the behaviour skipped it when the recording was made. Realtime-safe: yes.
+const ScriptedStep* find_step(const BehaviourScript& script, std::uint32_t frame_sequence) noexcept;
+
+}  // namespace wasp::scheduling

@@ -1,0 +1,58 @@
+// A TOML table read strictly: every value has a range, every error names file, line and value, and keys nobody asked for
+// are errors.
+#pragma once
+
+#include <set>
+#include <stdexcept>
+#include <string>
+#include <toml.hpp>
+#include <type_traits>
+#include <vector>
+
+namespace wasp::scheduling {
+
+class ConfigError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+class TomlTable {
+ public:
+  /// Throws ConfigError if the file cannot be read or is not TOML.
+  static TomlTable parse_file(const std::string& path);
+  explicit TomlTable(toml::value value) : value_(std::move(value)) {}
+
+  /// Leaves `out` as it is when the key is absent. Range is inclusive.
+  template <class T>
+  void number(const char* key, T& out, double low, double high) {
+    const toml::value* v = find(key);
+    if (v == nullptr) return;
+    double x = 0;
+    if (v->is_floating()) x = v->as_floating();
+    else if (v->is_integer()) x = static_cast<double>(v->as_integer());
+    else fail(*v, "must be a number");
+    if (std::is_integral_v<T> && x != static_cast<double>(static_cast<long long>(x))) fail(*v, "must be a whole number");
+    if (!(x >= low && x <= high)) fail(*v, "must lie in " + text(low) + " ... " + text(high));
+    out = static_cast<T>(x);
+  }
+  void flag(const char* key, bool& out);
+  /// `allowed` empty: any text.
+  void text_value(const char* key, std::string& out, const std::vector<std::string>& allowed = {});
+  void numbers(const char* key, std::vector<double>& out, double low, double high);
+  /// Child table; an empty one if absent.
+  TomlTable table(const char* key);
+  /// Names of the keys of this table.
+  [[nodiscard]] std::vector<std::string> keys() const;
+  /// Throws if the table holds a key nobody asked for.
+  void finish() const;
+
+ private:
+  static std::string text(double x);
+  [[noreturn]] static void fail(const toml::value& v, const std::string& why);
+  const toml::value* find(const char* key);
+
+  toml::value value_;
+  std::set<std::string> asked_;
+};
+
+}  // namespace wasp::scheduling

@@ -1,0 +1,33 @@
+// Names of the regions and topics: the one list that writers and readers share.
+//
+//   wasp.<instance>.camera   gray, depth            written by whoever is the camera (simulator, replay, driver
+//   process) wasp.<instance>.flight   imu, attitude, cue.<behaviour>, command, stages, run     written by the flight
+//   process wasp.<instance>.truth    truth                  written by the simulator; no flight thread reads it
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+namespace wasp::shm {
+
+inline std::string camera_region(const std::string& instance) { return "wasp." + instance + ".camera"; }
+inline std::string flight_region(const std::string& instance) { return "wasp." + instance + ".flight"; }
+inline std::string truth_region(const std::string& instance) { return "wasp." + instance + ".truth"; }
+
+inline constexpr const char* kGray = "gray";          ///< type Frame: FrameHeader, then pixels at kFramePixelOffset
+inline constexpr const char* kDepth = "depth";        ///< type Frame
+inline constexpr const char* kImu = "imu";            ///< type Imu: ImuSample
+inline constexpr const char* kAttitude = "attitude";  ///< type Attitude: AttitudeSample
+inline constexpr const char* kCommand = "command";    ///< type Command
+inline constexpr const char* kTruth = "truth";        ///< type Truth
+inline constexpr const char* kStages = "stages";      ///< block, type StageTable: latency of every stage
+inline std::string cue_topic(const std::string& behaviour) { return "cue." + behaviour; }  ///< type Cue
+
+inline constexpr std::uint32_t kFrameSlots = 8;  ///< 266 ms at 30 Hz
+inline constexpr std::uint32_t kImuSlots = 512;  ///< 2.5 s at 200 Hz: history to match a frame against
+inline constexpr std::uint32_t kAttitudeSlots = 256;
+inline constexpr std::uint32_t kCueSlots = 64;
+inline constexpr std::uint32_t kCommandSlots = 64;
+inline constexpr std::uint32_t kTruthSlots = 512;
+
+}  // namespace wasp::shm

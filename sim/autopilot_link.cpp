@@ -1,0 +1,164 @@
+#include "sim/autopilot_link.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace wasp::sim {
+namespace {
+
+constexpr std::uint8_t kSystem = 1, kComponent = 1;
+constexpr std::uint64_t kTicksPerSecond = 200;
+constexpr std::size_t kMaxQueued = 64 * 1024;
+constexpr std::uint16_t kCommandSetMode = 176, kCommandArm = 400;
+constexpr float kForce = 21196.f;
+constexpr std::uint8_t kIgnoreYawRate = 4, kIgnoreThrust = 64, kIgnoreAttitude = 128;
+
+bool for_us(std::uint8_t system, std::uint8_t component) {
+  return (system == kSystem || system == 0) && (component == kComponent || component == 0);
+}
+
+}  // namespace
+
+bool setpoint_of(const mavlink::SetAttitudeTarget& target, AttitudeSetpoint& setpoint) {
+  if ((target.type_mask & (kIgnoreThrust | kIgnoreAttitude)) != 0) return false;
+  const Quat q(target.q[0], target.q[1], target.q[2], target.q[3]);
+  const float norm = q.norm();
+  const bool by_rate = (target.type_mask & kIgnoreYawRate) == 0;
+  if (!std::isfinite(norm) || norm < 0.5f || !std::isfinite(target.thrust)) return false;
+  if (by_rate && !std::isfinite(target.body_yaw_rate)) return false;
+  setpoint.euler = euler_from_quat(q.normalized());
+  constexpr float kMaxTilt_rad = 0.6f;
+  setpoint.euler.roll_rad = std::clamp(setpoint.euler.roll_rad, -kMaxTilt_rad, kMaxTilt_rad);
+  setpoint.euler.pitch_rad = std::clamp(setpoint.euler.pitch_rad, -kMaxTilt_rad, kMaxTilt_rad);
+  setpoint.yaw_by_rate = by_rate;
+  setpoint.yaw_rate_radps = by_rate ? target.body_yaw_rate : 0.f;
+  setpoint.thrust = std::clamp(target.thrust, 0.f, 1.f);
+  return true;
+}
+
+AutopilotLink::AutopilotLink(FlightController& flight, DurationNs clock_offset_ns)
+    : flight_(flight), clock_offset_ns_(clock_offset_ns) {
+  output_.reserve(kMaxQueued);
+}
+
+template <class Message>
+void AutopilotLink::send(const Message& message) {
+  std::array<std::uint8_t, 280> bytes{};
+  const std::size_t size = encoder_.encode(message, bytes);
+  if (output_.size() + size > kMaxQueued) output_.clear();
+  output_.insert(output_.end(), bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(size));
+}
+
+void AutopilotLink::drain(std::vector<std::uint8_t>& out) {
+  out.insert(out.end(), output_.begin(), output_.end());
+  output_.clear();
+}
+
+void AutopilotLink::receive(std::span<const std::uint8_t> bytes, TimeNs now_ns) {
+  parser_.feed(bytes, [&](const mavlink::Frame& frame) { handle(frame, now_ns); });
+}
+
+void AutopilotLink::handle(const mavlink::Frame& frame, TimeNs now_ns) {
+  ++frames_received_;
+  if (frame.is<mavlink::CommandLong>()) on_command(frame.as<mavlink::CommandLong>(), frame);
+  if (frame.is<mavlink::SetAttitudeTarget>()) on_setpoint(frame.as<mavlink::SetAttitudeTarget>(), now_ns);
+  if (frame.is<mavlink::Timesync>()) on_timesync(frame.as<mavlink::Timesync>(), frame, now_ns);
+}
+
+void AutopilotLink::on_command(const mavlink::CommandLong& command, const mavlink::Frame& frame) {
+  if (!for_us(command.target_system, command.target_component)) return;
+  CommandResult result = CommandResult::kUnsupported;
+  if (command.command == kCommandArm) {
+    result = flight_.arm(command.param1 > 0.5f, command.param2 == kForce);
+  } else if (command.command == kCommandSetMode) {
+    const bool known = command.param1 >= 1 && command.param2 >= 0 && command.param2 < 256;  // NaN fails
+    result = known ? flight_.set_mode(static_cast<std::uint32_t>(command.param2)) : CommandResult::kDenied;
+  }
+  mavlink::CommandAck ack{};
+  ack.command = command.command;
+  ack.result = static_cast<std::uint8_t>(result);
+  ack.target_system = frame.system_id;
+  ack.target_component = frame.component_id;
+  send(ack);
+  send_heartbeat();  // the new state at once, not within a second
+}
+
+void AutopilotLink::on_setpoint(const mavlink::SetAttitudeTarget& target, TimeNs now_ns) {
+  AttitudeSetpoint setpoint;
+  if (for_us(target.target_system, target.target_component) && setpoint_of(target, setpoint))
+    flight_.set_setpoint(setpoint, now_ns);
+}
+
+void AutopilotLink::on_timesync(const mavlink::Timesync& sync, const mavlink::Frame& frame, TimeNs now_ns) {
+  if (sync.tc1 != 0) {  // the answer to a request of ours
+    companion_offset_ns_ = sync.tc1 - (sync.ts1 + own_time(now_ns)) / 2;
+    return;
+  }
+  mavlink::Timesync reply{};
+  reply.tc1 = own_time(now_ns);
+  reply.ts1 = sync.ts1;
+  reply.target_system = frame.system_id;
+  reply.target_component = frame.component_id;
+  send(reply);
+}
+
+void AutopilotLink::step(const ImuSample& imu, TimeNs now_ns) {
+  send_imu(imu, now_ns);
+  if (ticks_ % 2 == 0) send_attitude(now_ns);
+  if (ticks_ % kTicksPerSecond == 0) send_heartbeat();
+  if (ticks_ % kTicksPerSecond == kTicksPerSecond / 2) {
+    mavlink::Timesync request{};
+    request.ts1 = own_time(now_ns);
+    send(request);
+  }
+  if (const std::string_view event = flight_.take_event(); !event.empty()) {
+    send_text(event, flight_.descending() ? 2 : 6);
+    send_heartbeat();
+  }
+  ++ticks_;
+}
+
+void AutopilotLink::send_heartbeat() {
+  mavlink::Heartbeat m{};
+  const bool offboard = flight_.mode() == ControllerMode::kOffboard;
+  m.custom_mode = static_cast<std::uint32_t>(flight_.mode());
+  m.type = 2;       // quadrotor
+  m.autopilot = 0;  // generic
+  m.base_mode = static_cast<std::uint8_t>(1 | (offboard ? 8 : 64) | (flight_.armed() ? 128 : 0));
+  m.system_status = flight_.descending() ? 5 : flight_.armed() ? 4 : 3;
+  m.mavlink_version = 3;
+  send(m);
+}
+
+void AutopilotLink::send_attitude(TimeNs now_ns) {
+  mavlink::AttitudeQuaternion m{};
+  const Quat q = quat_from_euler(flight_.euler());
+  const Vec3 rate = flight_.rate_body_radps();
+  m.time_boot_ms = static_cast<std::uint32_t>(own_time(now_ns) / kMillisecond);
+  m.q1 = q.w(), m.q2 = q.x(), m.q3 = q.y(), m.q4 = q.z();
+  m.rollspeed = rate.x(), m.pitchspeed = rate.y(), m.yawspeed = rate.z();
+  send(m);
+}
+
+void AutopilotLink::send_imu(const ImuSample& imu, TimeNs now_ns) {
+  mavlink::HighresImu m{};
+  m.time_usec = static_cast<std::uint64_t>(own_time(now_ns) / kMicrosecond);
+  m.xacc = imu.accel_body_mps2[0], m.yacc = imu.accel_body_mps2[1], m.zacc = imu.accel_body_mps2[2];
+  m.xgyro = imu.gyro_body_radps[0], m.ygyro = imu.gyro_body_radps[1], m.zgyro = imu.gyro_body_radps[2];
+  m.xmag = imu.mag_body_gauss[0], m.ymag = imu.mag_body_gauss[1], m.zmag = imu.mag_body_gauss[2];
+  m.abs_pressure = imu.pressure_hpa;
+  m.pressure_alt = flight_.barometric_height_m();
+  m.temperature = imu.temperature_degc;
+  m.fields_updated = static_cast<std::uint16_t>(imu.fields);
+  send(m);
+}
+
+void AutopilotLink::send_text(std::string_view text, std::uint8_t severity) {
+  mavlink::Statustext m{};
+  m.severity = severity;
+  std::copy_n(text.begin(), std::min(text.size(), std::size(m.text)), std::begin(m.text));
+  send(m);
+}
+
+}  // namespace wasp::sim

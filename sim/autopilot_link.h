@@ -1,0 +1,58 @@
+// The autopilot's side of the serial line: MAVLink 2 as system 1, component 1. Sends HEARTBEAT 1 Hz, ATTITUDE_QUATERNION
+// 100 Hz, HIGHRES_IMU 200 Hz, its own TIMESYNC requests 1 Hz, STATUSTEXT on events; answers TIMESYNC; obeys
+// COMMAND_LONG 400 (arm) and 176 (mode), acknowledges every command; follows SET_ATTITUDE_TARGET.
+// Its clock runs at an offset from the simulator's, so that a companion must synchronise.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "messages/mavlink_frame.h"
+#include "messages/mavlink_messages.h"
+#include "sim/flight_controller.h"
+
+namespace wasp::sim {
+
+class AutopilotLink {
+ public:
+  /// `clock_offset_ns`: autopilot time minus simulation time.
+  AutopilotLink(FlightController& flight, DurationNs clock_offset_ns);
+
+  /// Bytes from the companion, in any pieces.
+  void receive(std::span<const std::uint8_t> bytes, TimeNs now_ns);
+  /// Once for every IMU sample (200 Hz): queues what is due.
+  void step(const ImuSample& imu, TimeNs now_ns);
+  /// Moves the queued bytes to the end of `out`. At most 64 KiB wait; older output is dropped when nobody drains.
+  void drain(std::vector<std::uint8_t>& out);
+
+  /// Companion clock minus autopilot clock from the last answered TIMESYNC [ns]; 0 before.
+  [[nodiscard]] DurationNs companion_offset_ns() const { return companion_offset_ns_; }
+  [[nodiscard]] std::uint64_t frames_received() const { return frames_received_; }
+
+ private:
+  void handle(const mavlink::Frame& frame, TimeNs now_ns);
+  void on_command(const mavlink::CommandLong& command, const mavlink::Frame& frame);
+  void on_setpoint(const mavlink::SetAttitudeTarget& target, TimeNs now_ns);
+  void on_timesync(const mavlink::Timesync& sync, const mavlink::Frame& frame, TimeNs now_ns);
+  void send_heartbeat();
+  void send_attitude(TimeNs now_ns);
+  void send_imu(const ImuSample& imu, TimeNs now_ns);
+  void send_text(std::string_view text, std::uint8_t severity);
+  [[nodiscard]] TimeNs own_time(TimeNs now_ns) const { return now_ns + clock_offset_ns_; }
+  template <class Message>
+  void send(const Message& message);
+
+  FlightController& flight_;
+  DurationNs clock_offset_ns_, companion_offset_ns_ = 0;
+  mavlink::Encoder encoder_{1, 1};
+  mavlink::Parser parser_;
+  std::vector<std::uint8_t> output_;
+  std::uint64_t ticks_ = 0, frames_received_ = 0;
+};
+
+/// Setpoint of a SET_ATTITUDE_TARGET; false when it must be ignored (masked attitude or thrust, numbers not finite, a
+/// quaternion that is none).
+bool setpoint_of(const mavlink::SetAttitudeTarget& target, AttitudeSetpoint& setpoint);
+
+}  // namespace wasp::sim

@@ -1,0 +1,122 @@
+#include "sim/flight_controller.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "sim/imu_model.h"
+
+namespace wasp::sim {
+namespace {
+
+constexpr float kStep_s = 0.005f;
+constexpr float kDescent_mps = -0.3f;
+constexpr float kDescentGain = 0.15f, kDescentIntegral_ps = 0.08f;
+constexpr DurationNs kStanding_ns = 500 * kMillisecond;  ///< on the legs this long: landed
+constexpr float kIdleThrust = 0.03f;                     ///< below this the propellers only turn over
+
+}  // namespace
+
+FlightController::FlightController(const VehicleParams& params) : params_(params), controller_(params) {}
+
+void FlightController::set_setpoint(const AttitudeSetpoint& setpoint, TimeNs now_ns) {
+  setpoint_ = setpoint;
+  setpoint_at_ns_ = now_ns;
+}
+
+CommandResult FlightController::arm(bool armed, bool force) {
+  if (armed && !armed_ && !force && !(estimator_.settled() && on_ground_)) return CommandResult::kTemporarilyRejected;
+  if (!armed && armed_ && !force && !on_ground_) return CommandResult::kDenied;
+  if (armed != armed_) event_ = armed ? "armed" : "disarmed";
+  if (armed && !armed_) mode_since_ns_ = now_ns_, grounded_since_ns_ = kLongAgo;
+  armed_ = armed;
+  descending_ = false;
+  return CommandResult::kAccepted;
+}
+
+CommandResult FlightController::set_mode(std::uint32_t custom_mode) {
+  if (custom_mode > 1) return CommandResult::kUnsupported;
+  const auto mode = static_cast<ControllerMode>(custom_mode);
+  if (mode != mode_) {
+    event_ = mode == ControllerMode::kOffboard ? "mode offboard" : "mode manual";
+    mode_since_ns_ = now_ns_;
+    descending_ = false;
+  }
+  mode_ = mode;
+  return CommandResult::kAccepted;
+}
+
+std::string_view FlightController::take_event() { return std::exchange(event_, {}); }
+
+std::array<double, 4> FlightController::step(const ImuSample& imu, bool on_ground, TimeNs now_ns) {
+  now_ns_ = now_ns;
+  on_ground_ = on_ground;
+  estimate(imu, kStep_s);
+  watch_setpoints(on_ground, now_ns);
+  if (!armed_) {
+    controller_.reset();
+    return {};
+  }
+  const AttitudeSetpoint active = active_setpoint(kStep_s);
+  if (active.thrust >= kIdleThrust) return controller_.step(active, euler(), rate_body_radps(), kStep_s);
+  controller_.reset();
+  const double idle_radps = 0.1 * params_.rotor.max_speed_radps();
+  return {idle_radps, idle_radps, idle_radps, idle_radps};
+}
+
+void FlightController::estimate(const ImuSample& imu, float dt_s) {
+  const Euler now = euler();
+  const float tilt = std::hypot(now.roll_rad, now.pitch_rad);
+  const float wanted = armed_ ? std::hypot(setpoint_.euler.roll_rad, setpoint_.euler.pitch_rad) : 0.f;
+  estimator_.step(imu, dt_s, on_ground_ && !armed_, std::max(tilt, wanted));
+  const Vec3 accel(imu.accel_body_mps2[0], imu.accel_body_mps2[1], imu.accel_body_mps2[2]);
+  const double height_m = height_of_pressure_m(static_cast<double>(imu.pressure_hpa));
+  vertical_.step(up_acceleration(accel, euler()), static_cast<float>(height_m), dt_s);
+}
+
+void FlightController::start_descent(std::string_view event) {
+  if (descending_) return;
+  descending_ = true;
+  descent_integral_ = 0;
+  descent_yaw_rad_ = euler().yaw_rad;
+  event_ = event;
+}
+
+void FlightController::watch_setpoints(bool on_ground, TimeNs now_ns) {
+  if (!armed_) return;
+  const TimeNs since = std::max(setpoint_at_ns_, mode_since_ns_);  // a mode just entered has the same grace
+  const bool silent = now_ns - since > kSetpointTimeout_ns;
+  if (mode_ == ControllerMode::kManual && !on_ground) start_descent("nobody flies: levelling and descending");
+  if (mode_ == ControllerMode::kOffboard && silent) start_descent("no setpoint for 0.5 s: levelling and descending");
+  if (mode_ == ControllerMode::kOffboard && !silent && descending_) {
+    descending_ = false;
+    event_ = "setpoints are back: following";
+  }
+  if (!descending_ || !on_ground) grounded_since_ns_ = kLongAgo;
+  if (descending_ && on_ground && grounded_since_ns_ == kLongAgo) grounded_since_ns_ = now_ns;
+  if (descending_ && on_ground && now_ns - grounded_since_ns_ > kStanding_ns) {
+    armed_ = descending_ = false;
+    event_ = "landed: disarmed";
+  }
+}
+
+AttitudeSetpoint FlightController::active_setpoint(float dt_s) {
+  if (descending_) return {{trim_roll_rad_, trim_pitch_rad_, descent_yaw_rad_}, false, 0, descent_thrust(dt_s)};
+  const bool heard = mode_ == ControllerMode::kOffboard && setpoint_at_ns_ >= mode_since_ns_ - kSetpointTimeout_ns;
+  if (!heard) return {};
+  AttitudeSetpoint setpoint = setpoint_;
+  setpoint.euler.roll_rad += trim_roll_rad_;
+  setpoint.euler.pitch_rad += trim_pitch_rad_;
+  return setpoint;
+}
+
+/// PI on the climb rate about the hover thrust; lets the propellers go as soon as the legs stand.
+float FlightController::descent_thrust(float dt_s) {
+  if (on_ground_) return 0;
+  const float error = kDescent_mps - vertical_.climb_mps();
+  descent_integral_ = std::clamp(descent_integral_ + kDescentIntegral_ps * error * dt_s, -0.15f, 0.1f);
+  const auto hover = static_cast<float>(params_.hover_thrust());
+  return std::clamp(hover + kDescentGain * error + descent_integral_, 0.6f * hover, 1.f);
+}
+
+}  // namespace wasp::sim

@@ -1,0 +1,70 @@
+// What a flight controller decides: armed or not, which mode, whose setpoint. Modes (HEARTBEAT custom_mode): 0 manual,
+// 1 offboard. In offboard it follows attitude setpoints; after 0.5 s without one it levels and descends gently until it
+// stands, then disarms; a new setpoint before that takes over again. Manual while flying does the same: nobody holds
+// the sticks of a simulated radio.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string_view>
+
+#include "sim/attitude_controller.h"
+#include "sim/attitude_estimator.h"
+#include "sim/vertical_estimator.h"
+#include "types/messages.h"
+
+namespace wasp::sim {
+
+inline constexpr DurationNs kSetpointTimeout_ns = 500 * kMillisecond;
+
+enum class ControllerMode : std::uint32_t { kManual = 0, kOffboard = 1 };
+
+/// Answers to commands, as MAV_RESULT numbers.
+enum class CommandResult : std::uint8_t { kAccepted = 0, kTemporarilyRejected = 1, kDenied = 2, kUnsupported = 3 };
+
+class FlightController {
+ public:
+  explicit FlightController(const VehicleParams& params);
+
+  /// One IMU sample (200 Hz); wanted rotor speeds [rad/s]. `on_ground` is the switch in the legs.
+  std::array<double, 4> step(const ImuSample& imu, bool on_ground, TimeNs now_ns);
+
+  void set_setpoint(const AttitudeSetpoint& setpoint, TimeNs now_ns);
+  /// Disarming in flight needs `force`; arming needs a settled estimate and ground under the legs.
+  CommandResult arm(bool armed, bool force);
+  CommandResult set_mode(std::uint32_t custom_mode);
+  /// Small corrections a safety pilot adds to the companion's roll and pitch [rad].
+  void set_trim(float roll_rad, float pitch_rad) { trim_roll_rad_ = roll_rad, trim_pitch_rad_ = pitch_rad; }
+
+  [[nodiscard]] bool armed() const { return armed_; }
+  [[nodiscard]] bool descending() const { return descending_; }  ///< without a companion
+  [[nodiscard]] ControllerMode mode() const { return mode_; }
+  [[nodiscard]] const AttitudeSetpoint& setpoint() const { return setpoint_; }
+  [[nodiscard]] Euler euler() const { return estimator_.euler(); }
+  [[nodiscard]] Vec3 rate_body_radps() const { return estimator_.rate_body_radps(); }
+  [[nodiscard]] float barometric_height_m() const { return vertical_.height_m(); }
+  /// Text of the latest event, once; empty if there is none.
+  std::string_view take_event();
+
+ private:
+  void estimate(const ImuSample& imu, float dt_s);
+  void watch_setpoints(bool on_ground, TimeNs now_ns);
+  [[nodiscard]] AttitudeSetpoint active_setpoint(float dt_s);
+  [[nodiscard]] float descent_thrust(float dt_s);
+  void start_descent(std::string_view event);
+
+  VehicleParams params_;
+  AttitudeEstimator estimator_;
+  VerticalEstimator vertical_;
+  AttitudeController controller_;
+  AttitudeSetpoint setpoint_;
+  static constexpr TimeNs kLongAgo = INT64_MIN / 2;  ///< leaves room to subtract
+  TimeNs setpoint_at_ns_ = kLongAgo, grounded_since_ns_ = kLongAgo, mode_since_ns_ = kLongAgo, now_ns_ = kLongAgo;
+  ControllerMode mode_ = ControllerMode::kManual;
+  bool armed_ = false, descending_ = false, on_ground_ = true;
+  float trim_roll_rad_ = 0, trim_pitch_rad_ = 0;
+  float descent_integral_ = 0, descent_yaw_rad_ = 0;
+  std::string_view event_;
+};
+
+}  // namespace wasp::sim

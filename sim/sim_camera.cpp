@@ -1,0 +1,30 @@
+#include "sim/sim_camera.h"
+
+namespace wasp::sim {
+
+SimCamera::SimCamera(const SimConfig& config)
+    : geometry_(config.camera),
+      renderer_(make_lab({config.seed, config.floor_edges_per_m, config.cartons}), config.camera.intrinsics),
+      sensor_(config.sensor, config.camera.intrinsics.width_px, config.camera.intrinsics.fx_px, config.seed),
+      luminance_(static_cast<std::size_t>(renderer_.width_px()) * Renderer::kBandRows),
+      depth_m_(luminance_.size()) {}
+
+CameraPose SimCamera::camera_pose(const BodyPose& pose) const {
+  return {pose.position_ned_m + pose.q_ned_body * geometry_.position_body_m,
+          pose.q_ned_body.toRotationMatrix() * geometry_.R_body_cam};
+}
+
+void SimCamera::render(const BodyPose& pose, std::uint32_t frame, std::uint8_t* gray, std::uint16_t* depth_mm) {
+  const CameraPose camera = camera_pose(pose);
+  const auto width = static_cast<std::size_t>(renderer_.width_px());
+  for (int band = 0; band < renderer_.height_px(); band += Renderer::kBandRows) {
+    renderer_.render_band(camera, band, luminance_.data(), depth_m_.data());
+    for (int i = 0; i < Renderer::kBandRows; ++i) {
+      const std::size_t from = static_cast<std::size_t>(i) * width, to = static_cast<std::size_t>(band + i) * width;
+      sensor_.gray_row(frame, band + i, luminance_.data() + from, gray + to);
+      sensor_.depth_row(frame, band + i, depth_m_.data() + from, depth_mm + to);
+    }
+  }
+}
+
+}  // namespace wasp::sim

@@ -1,0 +1,147 @@
+// One row for each key: section, name, range, and where the number goes. Booleans and arrays are numbers here too.
+#include "sim/sim_config.h"
+
+#include <functional>
+#include <fstream>
+#include <sstream>
+#include <stdexcept>
+#include <toml.hpp>
+
+namespace wasp::sim {
+namespace {
+
+/// What the file may set; angles are degrees in the file only.
+struct Draft {
+  SimConfig config;
+  double pitch_down_deg = 30;
+};
+
+struct Row {
+  const char* section;
+  const char* key;
+  double low, high;
+  std::function<void(Draft&, double)> set;
+};
+
+template <class Number>
+Row row(const char* section, const char* key, double low, double high, Number& (*where)(Draft&)) {
+  return {section, key, low, high, [where](Draft& d, double value) { where(d) = static_cast<Number>(value); }};
+}
+
+const std::vector<Row>& rows() {
+  using D = Draft;
+  static const std::vector<Row> kRows{
+      row<std::uint32_t>("run", "seed", 0, 4294967295.0, [](D& d) -> std::uint32_t& { return d.config.seed; }),
+      row<bool>("run", "safety_pilot", 0, 1, [](D& d) -> bool& { return d.config.safety_pilot; }),
+      row<double>("run", "clock_offset_s", 0, 1e6, [](D& d) -> double& { return d.config.clock_offset_s; }),
+      row<double>("vehicle", "mass_kg", 0.5, 2.2, [](D& d) -> double& { return d.config.vehicle.mass_kg; }),
+      row<double>("vehicle", "drag_Npmps", 0, 5, [](D& d) -> double& { return d.config.vehicle.drag_Npmps; }),
+      row<double>("imu", "gyro_noise_radps", 0, 1, [](D& d) -> double& { return d.config.imu.gyro_noise_radps; }),
+      row<double>("imu", "gyro_bias_radps", 0, 1, [](D& d) -> double& { return d.config.imu.gyro_bias_radps; }),
+      row<double>("imu", "gyro_walk_radps_sqrts", 0, 0.1, [](D& d) -> double& { return d.config.imu.gyro_walk_radps_sqrts; }),
+      row<double>("imu", "accel_noise_mps2", 0, 10, [](D& d) -> double& { return d.config.imu.accel_noise_mps2; }),
+      row<double>("imu", "accel_bias_mps2", 0, 2, [](D& d) -> double& { return d.config.imu.accel_bias_mps2; }),
+      row<double>("imu", "accel_walk_mps2_sqrts", 0, 1, [](D& d) -> double& { return d.config.imu.accel_walk_mps2_sqrts; }),
+      row<double>("imu", "mag_noise_gauss", 0, 1, [](D& d) -> double& { return d.config.imu.mag_noise_gauss; }),
+      row<double>("imu", "pressure_noise_hpa", 0, 5, [](D& d) -> double& { return d.config.imu.pressure_noise_hpa; }),
+      row<double>("camera", "rate_hz", 1, 120, [](D& d) -> double& { return d.config.camera_rate_hz; }),
+      row<int>("camera", "width_px", 32, 1920, [](D& d) -> int& { return d.config.camera.intrinsics.width_px; }),
+      row<int>("camera", "height_px", 32, 1440, [](D& d) -> int& { return d.config.camera.intrinsics.height_px; }),
+      row<float>("camera", "fx_px", 10, 10000, [](D& d) -> float& { return d.config.camera.intrinsics.fx_px; }),
+      row<float>("camera", "fy_px", 10, 10000, [](D& d) -> float& { return d.config.camera.intrinsics.fy_px; }),
+      row<float>("camera", "cx_px", -1000, 10000, [](D& d) -> float& { return d.config.camera.intrinsics.cx_px; }),
+      row<float>("camera", "cy_px", -1000, 10000, [](D& d) -> float& { return d.config.camera.intrinsics.cy_px; }),
+      row<float>("camera", "k1", -1, 1, [](D& d) -> float& { return d.config.camera.intrinsics.k1; }),
+      row<float>("camera", "k2", -1, 1, [](D& d) -> float& { return d.config.camera.intrinsics.k2; }),
+      row<float>("camera", "k3", -1, 1, [](D& d) -> float& { return d.config.camera.intrinsics.k3; }),
+      row<float>("camera", "p1", -0.1, 0.1, [](D& d) -> float& { return d.config.camera.intrinsics.p1; }),
+      row<float>("camera", "p2", -0.1, 0.1, [](D& d) -> float& { return d.config.camera.intrinsics.p2; }),
+      row<double>("camera", "pitch_down_deg", -30, 90, [](D& d) -> double& { return d.pitch_down_deg; }),
+      row<float>("camera", "forward_m", -0.5, 0.5, [](D& d) -> float& { return d.config.camera.position_body_m.x(); }),
+      row<float>("camera", "right_m", -0.5, 0.5, [](D& d) -> float& { return d.config.camera.position_body_m.y(); }),
+      row<float>("camera", "below_m", -0.5, 0.15, [](D& d) -> float& { return d.config.camera.position_body_m.z(); }),
+      row<bool>("sensor", "noise", 0, 1, [](D& d) -> bool& { return d.config.sensor.noise; }),
+      row<float>("sensor", "depth_noise_steps", 0, 20, [](D& d) -> float& { return d.config.sensor.depth_noise_steps; }),
+      row<float>("sensor", "min_range_m", 0.05, 5, [](D& d) -> float& { return d.config.sensor.min_range_m; }),
+      row<float>("sensor", "max_range_m", 0.5, 10, [](D& d) -> float& { return d.config.sensor.max_range_m; }),
+      row<float>("sensor", "dropout", 0, 1, [](D& d) -> float& { return d.config.sensor.dropout; }),
+      row<float>("sensor", "gain", 0.01, 20, [](D& d) -> float& { return d.config.sensor.gain; }),
+      row<float>("sensor", "read_noise", 0, 100, [](D& d) -> float& { return d.config.sensor.read_noise; }),
+      row<float>("sensor", "photon_noise", 0, 10, [](D& d) -> float& { return d.config.sensor.photon_noise; }),
+      row<double>("world", "floor_edges_per_m", 0.05, 20, [](D& d) -> double& { return d.config.floor_edges_per_m; }),
+      row<int>("world", "cartons", 0, 40, [](D& d) -> int& { return d.config.cartons; }),
+  };
+  return kRows;
+}
+
+[[noreturn]] void fail(const std::string& name, const std::string& why) { throw std::runtime_error(name + ": " + why); }
+
+double number_of(const toml::value& value, const std::string& name, const std::string& key) {
+  if (value.is_boolean()) return value.as_boolean() ? 1 : 0;
+  if (value.is_integer()) return static_cast<double>(value.as_integer());
+  if (value.is_floating()) return value.as_floating();
+  fail(name, "'" + key + "' is neither a number nor true or false");
+}
+
+void apply(Draft& draft, const std::string& section, const std::string& key, const toml::value& value,
+           const std::string& name) {
+  const std::string full = section + "." + key;
+  for (const Row& r : rows()) {
+    if (r.section != section || r.key != key) continue;
+    const double number = number_of(value, name, full);
+    if (!(number >= r.low && number <= r.high)) {
+      std::ostringstream why;
+      why << "'" << full << "' is " << number << ", allowed are " << r.low << " ... " << r.high;
+      fail(name, why.str());
+    }
+    return r.set(draft, number);
+  }
+  fail(name, "unknown key '" + full + "'");
+}
+
+void check(const SimConfig& config, const std::string& name) {
+  const Intrinsics& k = config.camera.intrinsics;
+  if (k.width_px % 4 != 0 || k.height_px % 4 != 0) fail(name, "camera.width_px and camera.height_px must be multiples of 4");
+  if (config.sensor.min_range_m >= config.sensor.max_range_m) fail(name, "sensor.min_range_m must be below sensor.max_range_m");
+}
+
+}  // namespace
+
+SimConfig::SimConfig() {
+  camera.R_body_cam = R_body_cam_from_pitch_down(to_radians(Degrees{30}));
+  camera.position_body_m = Vec3(0.05f, 0, 0);
+}
+
+SimConfig parse_sim_config(const std::string& toml_text, const std::string& name) {
+  std::istringstream stream(toml_text);
+  toml::value document;
+  try {
+    document = toml::parse(stream, name);
+  } catch (const std::exception& error) {
+    fail(name, error.what());
+  }
+  Draft draft;
+  for (const auto& [section, table] : document.as_table()) {
+    if (!table.is_table()) fail(name, "unknown key '" + section + "' outside any section");
+    for (const auto& [key, value] : table.as_table()) apply(draft, section, key, value, name);
+  }
+  draft.config.camera.R_body_cam = R_body_cam_from_pitch_down(to_radians(Degrees{draft.pitch_down_deg}));
+  check(draft.config, name);
+  return draft.config;
+}
+
+SimConfig load_sim_config(const std::string& path) {
+  std::ifstream file(path);
+  if (!file) throw std::runtime_error("cannot open simulator configuration '" + path + "'");
+  std::ostringstream text;
+  text << file.rdbuf();
+  return parse_sim_config(text.str(), path);
+}
+
+std::vector<std::string> sim_config_keys() {
+  std::vector<std::string> keys;
+  for (const Row& r : rows()) keys.push_back(std::string(r.section) + "." + r.key);
+  return keys;
+}
+
+}  // namespace wasp::sim

@@ -1,0 +1,40 @@
+// Every setting of the simulator, with its default. config/sim.toml documents the same list; a key that is not in it, or
+// a value outside its range, is an error that names the key.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "sim/imu_model.h"
+#include "sim/lab_world.h"
+#include "sim/sensor_model.h"
+#include "types/camera.h"
+
+namespace wasp::sim {
+
+struct SimConfig {
+  std::uint32_t seed = 1;
+  bool safety_pilot = true;
+  double clock_offset_s = 1000.25;  ///< autopilot clock minus the simulator's, 0 ... 1e6
+  double camera_rate_hz = 30;     ///< 1 ... 120
+  CameraGeometry camera;
+  VehicleParams vehicle;
+  ImuParams imu;
+  SensorParams sensor;
+  double floor_edges_per_m = 3.1;
+  int cartons = 9;
+
+  /// The Kinect of the thesis: 640 x 480, f = 525 px, pitched down by 30 degrees, 5 cm ahead of the centre of mass.
+  SimConfig();
+};
+
+/// Reads a TOML file over the defaults. Throws std::runtime_error naming the file and the key or line.
+SimConfig load_sim_config(const std::string& path);
+/// The same from text; `name` stands for the file in errors.
+SimConfig parse_sim_config(const std::string& toml_text, const std::string& name);
+
+/// All keys, as "section.key".
+std::vector<std::string> sim_config_keys();
+
+}  // namespace wasp::sim

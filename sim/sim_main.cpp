@@ -1,0 +1,140 @@
+// wasp-sim: hardware that is not there. A flight controller on a pseudo-terminal and a Kinect in shared memory, driven by
+// a simulated quadrotor in a simulated laboratory. The flying process cannot tell it from the vehicle.
+#include <CLI/CLI.hpp>
+#include <atomic>
+#include <csignal>
+#include <cstdio>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <system_error>
+
+#include "rt/thread.h"
+#include "shm/region.h"
+#include "shm/topics.h"
+#include "sim/camera_loop.h"
+#include "sim/vehicle_loop.h"
+
+namespace {
+
+using namespace wasp;
+using namespace wasp::sim;
+
+struct Options {
+  std::string instance = "wasp", tty_link, config_path;
+  std::optional<std::uint32_t> seed;
+  std::optional<double> rate_hz;
+  bool no_camera = false, no_safety_pilot = false;
+  double seconds = 0;
+};
+
+void declare(CLI::App& app, Options& o) {
+  app.add_option("--instance", o.instance, "name of the shared memory regions: wasp.NAME.camera, wasp.NAME.truth")->capture_default_str();
+  app.add_option("--tty-link", o.tty_link, "symbolic link to make to the autopilot's serial line")->required();
+  app.add_option("--config", o.config_path, "TOML file; see share/wasp/config/sim.toml for every key");
+  app.add_option("--seed", o.seed, "seed of world, sensors and vehicle (default: run.seed of the configuration)");
+  app.add_option("--rate-hz", o.rate_hz, "camera rate (default: camera.rate_hz of the configuration)")->check(CLI::Range(1.0, 120.0));
+  app.add_flag("--no-camera", o.no_camera, "autopilot and truth only");
+  app.add_flag("--no-safety-pilot", o.no_safety_pilot,
+               "do not hold the vehicle over its place: without this flag a small slow trim (at most 3 degrees, from the "
+               "true position) is added to roll and pitch, as the supervising pilot of the thesis' flights would");
+  app.add_option("--seconds", o.seconds, "end after this time; 0: run until SIGINT or SIGTERM")->check(CLI::NonNegativeNumber)->capture_default_str();
+}
+
+SimConfig settings(const Options& o) {
+  SimConfig config = o.config_path.empty() ? SimConfig{} : load_sim_config(o.config_path);
+  if (o.seed) config.seed = *o.seed;
+  if (o.rate_hz) config.camera_rate_hz = *o.rate_hz;
+  if (o.no_safety_pilot) config.safety_pilot = false;
+  return config;
+}
+
+/// SCHED_FIFO where that is allowed, else an ordinary thread on the same core.
+rt::Thread start_vehicle(std::function<void()> body) {
+  const int core = rt::nearest_usable_core(0);
+  try {
+    return rt::Thread({.name = "vehicle", .policy = rt::Policy::kFifo, .priority = 20, .core = core}, body);
+  } catch (const std::system_error&) {
+    std::fprintf(stderr, "wasp-sim: no right to SCHED_FIFO, the vehicle runs as an ordinary thread\n");
+    return rt::Thread({.name = "vehicle", .core = core}, body);
+  }
+}
+
+void wait_for_end(const sigset_t& signals, double seconds) {
+  if (seconds <= 0) {
+    int signal = 0;
+    sigwait(&signals, &signal);
+    return;
+  }
+  const TimeNs end_ns = rt::now() + from_seconds(seconds);
+  for (TimeNs now = rt::now(); now < end_ns; now = rt::now()) {
+    const timespec left = rt::to_timespec(end_ns - now);
+    if (sigtimedwait(&signals, nullptr, &left) > 0) return;
+  }
+}
+
+/// Regions that vanish with the simulator.
+struct Owned {
+  shm::Region region;
+  Owned(const std::string& name, std::span<const shm::TopicSpec> topics) : region(shm::Region::create(name, topics, "simulated")) {}
+  ~Owned() { shm::Region::remove(region.name()); }
+  Owned(const Owned&) = delete;
+  Owned& operator=(const Owned&) = delete;
+};
+
+void run(const Options& options, const sigset_t& signals) {
+  const SimConfig config = settings(options);
+  const auto camera = options.no_camera ? nullptr : std::make_unique<SimCamera>(config);
+  const shm::TopicSpec truth_topic{shm::kTruth, "Truth", shm::TopicKind::kRing, shm::kTruthSlots, sizeof(Truth)};
+  const Owned truth(shm::truth_region(options.instance), {&truth_topic, 1});
+  std::optional<Owned> frames;
+  if (camera) frames.emplace(shm::camera_region(options.instance), CameraLoop::topics(camera->width_px(), camera->height_px()));
+  Pty pty(options.tty_link);
+
+  const TimeNs start_ns = rt::now() + 10 * kMillisecond;
+  auto poses = std::make_unique<PoseQueue>();
+  VehicleLoop vehicle_loop(config, start_ns, pty, truth.region, *poses);
+  std::optional<CameraLoop> camera_loop;
+  if (camera) camera_loop.emplace(*camera, start_ns, config.camera_rate_hz, frames->region, *poses);
+
+  std::atomic<bool> stop{false};
+  rt::Thread vehicle_thread = start_vehicle([&] { vehicle_loop.run(stop); });
+  rt::Thread camera_thread;
+  if (camera_loop)
+    camera_thread = rt::Thread({.name = "camera", .core = rt::nearest_usable_core(0)}, [&] { camera_loop->run(stop); });
+  std::printf("wasp-sim: instance %s, serial line %s -> %s\n", options.instance.c_str(), options.tty_link.c_str(), pty.slave_path().c_str());
+  std::fflush(stdout);
+  wait_for_end(signals, options.seconds);
+  stop.store(true);
+  if (camera_thread.joinable()) camera_thread.join();
+  vehicle_thread.join();
+
+  std::printf("wasp-sim: %llu late ticks", static_cast<unsigned long long>(vehicle_loop.late_ticks()));
+  if (camera_loop)
+    std::printf(", %llu frames, %llu skipped, rendering p50 %.2f ms, max %.2f ms",
+                static_cast<unsigned long long>(camera_loop->frames()), static_cast<unsigned long long>(camera_loop->skipped()),
+                static_cast<double>(camera_loop->render_time().quantile_ns(0.5)) * 1e-6,
+                static_cast<double>(camera_loop->render_time().max_ns()) * 1e-6);
+  std::printf("\n");
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{"wasp-sim: a simulated quadrotor with autopilot (MAVLink on a pseudo-terminal) and Kinect (shared memory)"};
+  Options options;
+  declare(app, options);
+  CLI11_PARSE(app, argc, argv);
+  sigset_t signals;  // taken by sigwait in the main thread only
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGINT);
+  sigaddset(&signals, SIGTERM);
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+  try {
+    run(options, signals);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "wasp-sim: %s\n", error.what());
+    return 1;
+  }
+  return 0;
+}

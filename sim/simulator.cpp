@@ -1,0 +1,60 @@
+#include "sim/simulator.h"
+
+namespace wasp::sim {
+namespace {
+
+constexpr std::uint64_t kStepsPerControl = kControlPeriod_ns / kPhysicsPeriod_ns;
+
+std::array<float, 3> to_floats(const Eigen::Vector3d& v) {
+  return {static_cast<float>(v.x()), static_cast<float>(v.y()), static_cast<float>(v.z())};
+}
+
+}  // namespace
+
+Simulator::Simulator(const SimConfig& config, TimeNs start_ns)
+    : camera_body_m_(config.camera.position_body_m),
+      vehicle_(config.vehicle),
+      imu_(config.imu, mix(config.seed, 1)),
+      flight_(config.vehicle),
+      link_(flight_, from_seconds(config.clock_offset_s)),
+      pilot_(config.safety_pilot),
+      now_ns_(start_ns) {}
+
+void Simulator::advance_to(TimeNs t_ns) {
+  while (now_ns_ + kPhysicsPeriod_ns <= t_ns) {
+    vehicle_.step(wanted_radps_);
+    now_ns_ += kPhysicsPeriod_ns;
+    if (++physics_steps_ % kStepsPerControl == 0) control_tick();
+  }
+}
+
+void Simulator::control_tick() {
+  const VehicleState& state = vehicle_.state();
+  const ImuSample imu = imu_.sample(state, to_seconds(kControlPeriod_ns), now_ns_);
+  const AttitudeSetpoint commanded = flight_.descending() ? AttitudeSetpoint{} : flight_.setpoint();
+  const PilotTrim trim = pilot_.step(state, commanded, flight_.armed() && !state.on_ground);
+  flight_.set_trim(trim.roll_rad, trim.pitch_rad);
+  wanted_radps_ = flight_.step(imu, state.on_ground, now_ns_);
+  link_.step(imu, now_ns_);
+}
+
+BodyPose Simulator::pose() const {
+  return {now_ns_, vehicle_.state().position_ned_m.cast<float>(), vehicle_.state().q_ned_body.cast<float>()};
+}
+
+Truth Simulator::truth() const {
+  const VehicleState& s = vehicle_.state();
+  const Eigen::Vector3d camera = s.position_ned_m + s.q_ned_body * camera_body_m_.cast<double>();
+  Truth truth;
+  truth.exposed_at_ns = now_ns_;
+  truth.position_ned_m = to_floats(s.position_ned_m);
+  truth.velocity_ned_mps = to_floats(s.velocity_ned_mps);
+  const Eigen::Quaternionf q = s.q_ned_body.cast<float>();
+  truth.q_ned_body = {q.w(), q.x(), q.y(), q.z()};
+  truth.rate_body_radps = to_floats(s.rate_body_radps);
+  truth.height_m = static_cast<float>(-camera.z());
+  truth.armed = flight_.armed() ? 1.f : 0.f;
+  return truth;
+}
+
+}  // namespace wasp::sim

@@ -1,0 +1,59 @@
+// The whole simulated vehicle on virtual time: physics at 1 kHz, sensors, flight controller and serial link at 200 Hz.
+// It reads no clock: `advance_to` runs it as far as it is told, so a lockstep test and the real-time program use the same
+// class, and the same seed and bytes give the same flight.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "sim/autopilot_link.h"
+#include "sim/pose.h"
+#include "sim/safety_pilot.h"
+#include "sim/sim_config.h"
+#include "sim/vehicle.h"
+#include "types/messages.h"
+
+namespace wasp::sim {
+
+inline constexpr DurationNs kPhysicsPeriod_ns = kMillisecond;
+inline constexpr DurationNs kControlPeriod_ns = 5 * kMillisecond;  ///< IMU and flight controller, 200 Hz
+
+class Simulator {
+ public:
+  explicit Simulator(const SimConfig& config, TimeNs start_ns = 0);
+  Simulator(const Simulator&) = delete;
+  Simulator& operator=(const Simulator&) = delete;
+
+  /// Runs whole milliseconds until less than one is left before `t`; earlier times change nothing.
+  void advance_to(TimeNs t_ns);
+  [[nodiscard]] TimeNs now_ns() const { return now_ns_; }
+
+  /// Bytes the companion wrote. Heard now, or a little later where a real clock runs on between two ticks.
+  void from_companion(std::span<const std::uint8_t> bytes) { link_.receive(bytes, now_ns_); }
+  void from_companion(std::span<const std::uint8_t> bytes, TimeNs heard_at_ns) { link_.receive(bytes, heard_at_ns); }
+  /// Moves the bytes the autopilot has written to the end of `out`.
+  void drain(std::vector<std::uint8_t>& out) { link_.drain(out); }
+
+  [[nodiscard]] Truth truth() const;
+  [[nodiscard]] BodyPose pose() const;
+  [[nodiscard]] const FlightController& flight() const { return flight_; }
+  [[nodiscard]] const Vehicle& vehicle() const { return vehicle_; }
+  [[nodiscard]] const AutopilotLink& link() const { return link_; }
+
+ private:
+  void control_tick();
+
+  Vec3 camera_body_m_;
+  Vehicle vehicle_;
+  ImuModel imu_;
+  FlightController flight_;
+  AutopilotLink link_;
+  SafetyPilot pilot_;
+  std::array<double, 4> wanted_radps_{};
+  TimeNs now_ns_;
+  std::uint64_t physics_steps_ = 0;
+};
+
+}  // namespace wasp::sim

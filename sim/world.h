@@ -1,0 +1,45 @@
+// A world as the renderer wants it: planar quads, each with a surface (texture, its axes, brightness). Light is one lamp
+// direction plus ambient, so a planar surface has one brightness, worked out when it is added.
+// World coordinates are NED with the floor at z = 0 [m].
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "sim/texture.h"
+#include "types/frames.h"
+
+namespace wasp::sim {
+
+/// How a material looks; `repeat_m` is the length of one texture repeat.
+struct Material {
+  int texture = 0;
+  float repeat_m = 1;
+  float albedo = 1;  ///< multiplies the texture, 0 ... 1.5
+  float glow = 0;    ///< light of its own, as a share of full white (lamps, windows, screens)
+};
+
+/// Texture coordinates are (u_axis . p + u0, v_axis . p + v0) in repeats for a world point p.
+struct Surface {
+  Vec3 u_axis, v_axis, normal;
+  float u0 = 0, v0 = 0;
+  float brightness = 1;  ///< pixel value per texture value
+  float glow = 0;        ///< pixel value added
+  float texels_per_m = 1;
+  std::int32_t texture = 0;
+};
+
+struct World {
+  std::vector<Vec3> vertices_ned_m;
+  std::vector<std::array<std::uint32_t, 4>> quads;
+  std::vector<Surface> surfaces;  ///< one for each quad
+  std::vector<Texture> textures;
+
+  /// A parallelogram with one corner and two edges; its normal is edge_u x edge_v, light falls on both sides alike.
+  void add_quad(const Vec3& corner, const Vec3& edge_u, const Vec3& edge_v, const Material& material);
+  /// A box standing on `base` (centre of its underside, NED), turned by `yaw_rad`; the underside is included.
+  void add_box(const Vec3& base, const Vec3& size_m, float yaw_rad, const Material& material);
+};
+
+}  // namespace wasp::sim

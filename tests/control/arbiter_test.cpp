@@ -1,0 +1,87 @@
+#include "control/arbiter.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+namespace wasp::control {
+namespace {
+
+Cue height_cue(TimeNs exposed_at_ns, float height_m) {
+  Cue c;
+  c.exposed_at_ns = exposed_at_ns;
+  c.body.validity = Validity::kValid;
+  c.body.has_height = 1;
+  c.body.height_m = height_m;
+  return c;
+}
+
+struct ArbiterTest : ::testing::Test {
+  ArbiterParams params;
+  CueSet set;
+  ArbiterTest() {
+    params.behaviour_count = 3;
+    params.rows[0].height_rank = 0;
+    params.rows[1].height_rank = 1;
+  }
+  void give(std::size_t i, const Cue& cue) {
+    set.cues[i] = cue;
+    set.present[i] = true;
+  }
+};
+
+TEST_F(ArbiterTest, TakesTheFirstSourceThatSees) {
+  give(0, height_cue(0, 1.f));
+  give(1, height_cue(0, 2.f));
+  EXPECT_EQ(arbitrate(params, set, 1).height_source, 0);
+  set.cues[0].body.validity = Validity::kBlind;
+  EXPECT_EQ(arbitrate(params, set, 1).height_source, 1);
+  set.cues[1].body.validity = Validity::kBlind;
+  EXPECT_EQ(arbitrate(params, set, 1).height_source, -1);
+}
+
+TEST_F(ArbiterTest, AnOldCueIsAbsent) {
+  give(0, height_cue(0, 1.f));
+  EXPECT_EQ(arbitrate(params, set, params.rows[0].age_limit_ns).height_source, 0);
+  EXPECT_EQ(arbitrate(params, set, params.rows[0].age_limit_ns + 1).height_source, -1);
+}
+
+TEST_F(ArbiterTest, ACueMadeOverBudgetIsAbsent) {
+  give(0, height_cue(0, 1.f));
+  set.cues[0].over_budget = 1;
+  EXPECT_EQ(arbitrate(params, set, 1).height_source, -1);
+}
+
+TEST_F(ArbiterTest, NothingNonFinitePasses) {
+  for (float CueBody::*field : {&CueBody::height_m, &CueBody::height_sigma_m, &CueBody::heading_rate_radps, &CueBody::pitch_rad})
+    for (const float bad : {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
+      give(0, height_cue(0, 1.f));
+      set.cues[0].body.*field = bad;
+      EXPECT_EQ(arbitrate(params, set, 1).height_source, -1);
+    }
+}
+
+TEST_F(ArbiterTest, AvoidForbidsForwardPitch) {
+  Cue forward;
+  forward.body.validity = Validity::kValid;
+  forward.body.has_pitch = 1;
+  forward.body.pitch_rad = -0.1f;
+  params.rows[2].pitch_weight = 1.f;
+  give(2, forward);
+  EXPECT_FLOAT_EQ(arbitrate(params, set, 1).pitch_rad, -0.1f);
+  Cue avoid = height_cue(0, 1.f);
+  avoid.body.avoid = 1;
+  give(0, avoid);
+  EXPECT_TRUE(arbitrate(params, set, 1).avoid);
+  EXPECT_FLOAT_EQ(arbitrate(params, set, 1).pitch_rad, 0.f);
+}
+
+TEST_F(ArbiterTest, EvidenceIsTheOldestUsed) {
+  params.rows[1].heading_weight = 1.f;
+  give(0, height_cue(50, 1.f));
+  give(1, height_cue(20, 1.f));
+  EXPECT_EQ(arbitrate(params, set, 60).oldest_exposed_at_ns, 20);
+}
+
+}  // namespace
+}  // namespace wasp::control

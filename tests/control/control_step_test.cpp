@@ -1,0 +1,125 @@
+// The whole control path as one pure function: whatever comes in, what goes out is finite and within limits.
+#include "control/control_step.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <random>
+
+namespace wasp::control {
+namespace {
+
+ControlParams params() {
+  ControlParams p;
+  p.arbiter.behaviour_count = 2;
+  p.arbiter.rows[0].height_rank = 0;
+  p.arbiter.rows[1].height_rank = 1;
+  p.arbiter.rows[1].heading_weight = 1;
+  p.arbiter.rows[1].pitch_weight = 1;
+  p.mission.leg_count = 1;
+  p.mission.legs[0] = {0.5f, 60.f};
+  return p;
+}
+
+ControlInput good_input(TimeNs now_ns) {
+  ControlInput in;
+  in.now_ns = now_ns;
+  in.cues.present[0] = true;
+  in.cues.cues[0].exposed_at_ns = now_ns - 40 * kMillisecond;
+  in.cues.cues[0].body.validity = Validity::kValid;
+  in.cues.cues[0].body.has_height = 1;
+  in.cues.cues[0].body.height_m = 0.5f;
+  in.attitude_present = true;
+  in.attitude.exposed_at_ns = now_ns - 5 * kMillisecond;
+  in.accel_present = true;
+  in.accel_body_mps2 = {0, 0, -9.80665f};
+  in.autopilot = {now_ns - 5 * kMillisecond, true, true};
+  return in;
+}
+
+TEST(ControlStep, FliesWhenEverythingIsThere) {
+  ControlState state;
+  ControlOutput out;
+  for (int i = 1; i < 100; ++i) out = control_step(params(), good_input(i * 50 * kMillisecond), state);
+  EXPECT_EQ(out.command.mode, FlightMode::kBehaviour);
+  EXPECT_EQ(out.command.cue_source, 0);
+  EXPECT_NEAR(out.command.thrust, 0.843f, 0.03f);  // near the weight: it is at its setpoint
+  EXPECT_EQ(out.command.exposed_at_ns, 99 * 50 * kMillisecond - 40 * kMillisecond);
+}
+
+TEST(ControlStep, HoldsThenFailsafeWhenTheGroundIsLost) {
+  const ControlParams p = params();
+  ControlState state;
+  TimeNs t = 0;
+  for (int i = 0; i < 60; ++i) control_step(p, good_input(t += 50 * kMillisecond), state);
+  ControlOutput out;
+  const TimeNs lost_at = t;
+  while (t - lost_at < p.ground_hold_limit_ns + p.arbiter.rows[0].age_limit_ns + 200 * kMillisecond) {
+    ControlInput in = good_input(t += 50 * kMillisecond);
+    in.cues.cues[0].exposed_at_ns = lost_at;
+    out = control_step(p, in, state);
+    if (t - lost_at > p.arbiter.rows[0].age_limit_ns && t - lost_at <= p.ground_hold_limit_ns) {
+      EXPECT_EQ(out.command.mode, FlightMode::kHold);
+      EXPECT_EQ(out.command.cue_source, -1);
+    }
+  }
+  EXPECT_EQ(out.command.mode, FlightMode::kFailsafe);
+  EXPECT_LT(out.command.thrust, 0.843f);
+  EXPECT_GT(out.command.thrust, 0.75f);
+}
+
+TEST(ControlStep, StopStreamFailsafeSendsNothing) {
+  ControlParams p = params();
+  p.failsafe_action = FailsafeAction::kStopStream;
+  ControlState state;
+  ControlInput in = good_input(50 * kMillisecond);
+  in.attitude_present = false;
+  EXPECT_EQ(control_step(p, in, state).command.sent, 0);
+}
+
+/// A float of any bit pattern, so NaN, infinities and denormals come too.
+float any_float(std::mt19937& random) {
+  const std::uint32_t bits = random();
+  float f;
+  std::memcpy(&f, &bits, sizeof f);
+  return f;
+}
+
+TEST(ControlStep, PropertyNothingWildEverLeaves) {
+  std::mt19937 random(2026);
+  ControlParams p = params();
+  ControlState state;
+  TimeNs t = 0;
+  for (int i = 0; i < 50'000; ++i) {
+    ControlInput in = good_input(t += 50 * kMillisecond);
+    const auto chance = [&](unsigned n) { return random() % n == 0; };
+    for (std::size_t b = 0; b < 2; ++b) {
+      in.cues.present[b] = !chance(4);
+      auto& body = in.cues.cues[b].body;
+      body.validity = chance(5) ? Validity::kBlind : Validity::kValid;
+      body.has_height = !chance(3);
+      body.has_heading_rate = body.has_pitch = !chance(2);
+      if (chance(3)) body.height_m = any_float(random);
+      if (chance(3)) body.heading_rate_radps = any_float(random);
+      if (chance(3)) body.pitch_rad = any_float(random);
+      in.cues.cues[b].exposed_at_ns = chance(6) ? t - 10 * kSecond : t - 40 * kMillisecond;
+    }
+    if (chance(5)) in.accel_body_mps2[2] = any_float(random);
+    if (chance(7)) in.attitude_present = false;
+    if (chance(9)) in.autopilot.follows = false;
+    if (chance(50)) in.autopilot.armed = false;
+    if (chance(300)) state = ControlState{};
+    const Command c = control_step(p, in, state).command;
+    ASSERT_TRUE(std::isfinite(c.thrust) && c.thrust >= 0 && c.thrust <= 1) << i;
+    ASSERT_TRUE(std::isfinite(c.yaw_rate_radps) && std::fabs(c.yaw_rate_radps) <= p.limits.max_yaw_rate_radps) << i;
+    float norm = 0;
+    for (const float q : c.q_ned_body) norm += q * q;
+    ASSERT_NEAR(norm, 1.f, 1e-3f) << i;
+    ASSERT_TRUE(std::isfinite(c.height_m) && std::isfinite(c.climb_rate_mps)) << i;
+  }
+}
+
+}  // namespace
+}  // namespace wasp::control

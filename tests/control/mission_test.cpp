@@ -1,0 +1,85 @@
+#include "control/mission.h"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+namespace wasp::control {
+namespace {
+
+MissionParams two_legs() {
+  MissionParams p;
+  p.leg_count = 2;
+  p.legs = {HoverLeg{0.5f, 4.f}, HoverLeg{1.0f, 4.f}};
+  return p;
+}
+
+/// A vehicle that obeys at once: armed when asked, at the target height.
+struct Obedient {
+  MissionParams params = two_legs();
+  MissionState state;
+  MissionInput input;
+  std::vector<MissionPhase> phases;
+
+  MissionWish step() {
+    const MissionWish wish = mission_step(params, input, state);
+    input.now_ns += 50 * kMillisecond;
+    if (wish.armed) input.armed = input.follows = true;
+    if (wish.disarm) input.armed = false;
+    if (wish.rotors) input.height_m = std::max(0.2f, wish.target_m);
+    if (phases.empty() || phases.back() != state.phase) phases.push_back(state.phase);
+    return wish;
+  }
+  void run(int ticks) {
+    for (int i = 0; i < ticks; ++i) step();
+  }
+};
+
+Obedient standing() {
+  Obedient v;
+  v.input.ground_seen = true;
+  v.input.height_m = 0.2f;
+  return v;
+}
+
+TEST(Mission, FliesEveryLegLandsAndDisarms) {
+  Obedient v = standing();
+  v.run(400);
+  const auto leg = [](int i) { return static_cast<MissionPhase>(static_cast<int>(MissionPhase::kLeg0) + i); };
+  EXPECT_EQ(v.phases, (std::vector<MissionPhase>{MissionPhase::kArm, leg(0), leg(1), MissionPhase::kLand, MissionPhase::kDisarm,
+                                                 MissionPhase::kDone}));
+  EXPECT_FALSE(v.input.armed);
+}
+
+TEST(Mission, StopRequestLandsInOrder) {
+  Obedient v = standing();
+  v.run(60);
+  ASSERT_EQ(leg_of(v.state.phase), 0);
+  v.input.stop_requested = true;
+  v.run(100);
+  EXPECT_EQ(v.state.phase, MissionPhase::kDone);
+}
+
+TEST(Mission, DisarmedInFlightItNeverArmsAgain) {
+  Obedient v = standing();
+  v.run(60);
+  v.input.armed = false;
+  for (int i = 0; i < 200; ++i) {
+    const MissionWish wish = v.step();
+    if (i > 0) {
+      EXPECT_FALSE(wish.armed);
+      EXPECT_FALSE(wish.rotors);
+    }
+  }
+  EXPECT_EQ(v.state.phase, MissionPhase::kBroken);
+}
+
+TEST(Mission, GivesUpWhenTheGroundIsNeverSeen) {
+  Obedient v;
+  v.run(static_cast<int>(v.params.patience_s * 20) + 10);
+  EXPECT_EQ(v.state.phase, MissionPhase::kBroken);
+  EXPECT_FALSE(v.input.armed);
+}
+
+}  // namespace
+}  // namespace wasp::control

@@ -1,0 +1,157 @@
+// The adaptor with a made-up behaviour: cues carry what the step was given and every part of its latency.
+#include "scheduling/behaviour_loop.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cstring>
+#include <thread>
+
+#include "rt/clock.h"
+#include "scheduling/flight_regions.h"
+
+namespace wasp::scheduling {
+namespace {
+
+/// Says the mean of the first row as a height; spins when told to.
+struct Mean {
+  static constexpr std::string_view kName = "mean";
+  static constexpr DurationNs kBudgetNs = 50 * kMillisecond;
+  static constexpr Stream kStream = Stream::kGray;
+  struct Params {};
+  struct State {
+    std::uint32_t steps = 0;
+  };
+  static CueBody step(const Params&, const BehaviourInput& in, State& state) noexcept {
+    CueBody body;
+    int sum = 0;
+    for (int u = 0; u < in.gray.width_px; ++u) sum += in.gray.row(0)[u];
+    body.validity = Validity::kValid;
+    body.has_height = 1;
+    body.height_m = static_cast<float>(sum) / static_cast<float>(in.gray.width_px);
+    body.detail[0] = in.attitude_valid ? in.attitude.q_ned_body[1] : -1.f;
+    body.detail[1] = static_cast<float>(++state.steps);
+    return body;
+  }
+};
+
+class BehaviourLoopTest : public ::testing::Test {
+ protected:
+  static constexpr std::uint32_t kWidth = 32, kHeight = 16;
+  BehaviourLoopTest()
+      : instance_("test-loop-" + std::to_string(getpid())),
+        camera_(shm::Region::create(shm::camera_region(instance_), camera_topics())),
+        flight_(create_flight_region(instance_, {"mean"}, false)),
+        gray_(camera_, shm::kGray),
+        attitude_(flight_, shm::kAttitude),
+        cues_(flight_, shm::cue_topic("mean"), "Cue") {
+    control_.status = &run_status(flight_);
+  }
+  ~BehaviourLoopTest() override {
+    shm::Region::remove(shm::camera_region(instance_));
+    shm::Region::remove(shm::flight_region(instance_));
+  }
+  static std::vector<shm::TopicSpec> camera_topics() {
+    return {{shm::kGray, "Frame", shm::TopicKind::kRing, shm::kFrameSlots, kFramePixelOffset + kWidth * kHeight}};
+  }
+  BehaviourWiring wiring() {
+    BehaviourWiring w;
+    w.camera = &camera_;
+    w.flight = &flight_;
+    w.budget_ns = Mean::kBudgetNs;
+    w.stages = &stage_table(flight_);
+    return w;
+  }
+  void publish_frame(std::uint32_t sequence, std::uint8_t value, TimeNs exposed_at_ns, std::uint32_t stride = kWidth) {
+    std::byte* slot = gray_.loan();
+    FrameHeader h;
+    h.exposed_at_ns = exposed_at_ns;
+    h.sequence = sequence;
+    h.format = PixelFormat::kMono8;
+    h.width_px = kWidth;
+    h.height_px = kHeight;
+    h.stride_bytes = stride;
+    std::memcpy(slot, &h, sizeof h);
+    std::memset(slot + kFramePixelOffset, value, kWidth * kHeight);
+    gray_.publish(rt::now());
+  }
+  Cue wait_for_cue() {
+    Cue cue;
+    for (int i = 0; i < 60'000 && !cues_.read(cue); ++i) rt::sleep_until(rt::now() + kMillisecond);
+    return cue;
+  }
+  template <class Body>
+  void with_loop(const BehaviourWiring& w, Body&& body) {
+    BehaviourLoop<Mean> loop({}, w);
+    std::thread thread([&] { loop.run(control_); });
+    body();
+    control_.stop = true;
+    thread.join();
+  }
+
+  std::string instance_;
+  shm::Region camera_, flight_;
+  shm::RingWriter gray_, attitude_;
+  shm::RingReader cues_;
+  LoopControl control_;
+};
+
+TEST_F(BehaviourLoopTest, CueCarriesInputsAndTimes) {
+  const TimeNs exposed = rt::now();
+  AttitudeSample early, late;
+  early.exposed_at_ns = exposed - 5 * kMillisecond;
+  early.q_ned_body = {1, 0.25f, 0, 0};
+  late.exposed_at_ns = exposed + 5 * kMillisecond;  // after the exposure: must not be used
+  late.q_ned_body = {1, 0.75f, 0, 0};
+  attitude_.write(early, exposed);
+  attitude_.write(late, exposed);
+  with_loop(wiring(), [&] {
+    publish_frame(9, 40, exposed);
+    const Cue cue = wait_for_cue();
+    EXPECT_EQ(cue.frame_sequence, 9u);
+    EXPECT_EQ(cue.exposed_at_ns, exposed);
+    EXPECT_FLOAT_EQ(cue.body.height_m, 40.f);
+    EXPECT_EQ(cue.attitude_valid, 1u);
+    EXPECT_FLOAT_EQ(cue.body.detail[0], 0.25f);
+    EXPECT_LE(cue.exposed_at_ns, cue.released_at_ns);
+    EXPECT_LE(cue.released_at_ns, cue.started_at_ns);
+    EXPECT_LE(cue.started_at_ns, cue.finished_at_ns);
+  });
+  const StageTable& stages = stage_table(flight_);
+  ASSERT_EQ(stages.count.load(), 2u);
+  EXPECT_EQ(stages.stages[0].histogram.count(), 1u);
+  EXPECT_EQ(stages.stages[1].histogram.count(), 1u);
+}
+
+TEST_F(BehaviourLoopTest, AHeaderThatLiesIsNotFollowed) {
+  with_loop(wiring(), [&] {
+    publish_frame(1, 40, rt::now(), 1u << 20);  // a stride beyond the slot
+    publish_frame(2, 50, rt::now());
+    EXPECT_EQ(wait_for_cue().frame_sequence, 2u);
+  });
+}
+
+TEST_F(BehaviourLoopTest, ScriptSkipsFramesAndSuppliesAttitude) {
+  BehaviourScript script(2);
+  script[0].frame_sequence = 1;
+  script[1].frame_sequence = 3;
+  script[1].attitude_valid = true;
+  script[1].attitude.q_ned_body = {1, 0.5f, 0, 0};
+  std::atomic<std::uint64_t> done{0};
+  BehaviourWiring w = wiring();
+  w.script = &script;
+  w.frames_done = &done;
+  with_loop(w, [&] {
+    for (std::uint32_t n = 1; n <= 3; ++n) publish_frame(n, static_cast<std::uint8_t>(n), rt::now());
+    const Cue first = wait_for_cue(), second = wait_for_cue();
+    EXPECT_EQ(first.frame_sequence, 1u);
+    EXPECT_EQ(first.attitude_valid, 0u);
+    EXPECT_EQ(second.frame_sequence, 3u);
+    EXPECT_FLOAT_EQ(second.body.detail[0], 0.5f);
+    EXPECT_FLOAT_EQ(second.body.detail[1], 2.f);
+  });
+  EXPECT_EQ(done.load(), 3u);
+}
+
+}  // namespace
+}  // namespace wasp::scheduling

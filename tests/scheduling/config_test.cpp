@@ -1,0 +1,94 @@
+// Configuration is read strictly: file, line and value are named, nothing unknown passes.
+#include "scheduling/config.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <unistd.h>
+
+namespace wasp::scheduling {
+namespace {
+
+const std::vector<std::string> kNames{"ground_altitude", "edge_altitude"};
+
+class ConfigTest : public ::testing::Test {
+ protected:
+  std::string write(const std::string& text) {
+    path_ = std::filesystem::temp_directory_path() / ("wasp_config_" + std::to_string(getpid()) + ".toml");
+    std::ofstream(path_) << text;
+    return path_.string();
+  }
+  /// Error text of loading `text`, empty if it loads.
+  std::string error_of(const std::string& text) {
+    try {
+      load_config({write(text)}, kNames);
+    } catch (const ConfigError& e) {
+      return e.what();
+    }
+    return {};
+  }
+  void TearDown() override { std::filesystem::remove(path_); }
+  std::filesystem::path path_;
+};
+
+TEST_F(ConfigTest, ShippedDefaultsLoadAndMatchTheBuiltInOnes) {
+  const Config file = load_config({WASP_SOURCE_DIR "/config/wasp.toml"}, kNames);
+  const Config built_in = load_config({}, kNames);
+  EXPECT_EQ(file.control_period_ns, built_in.control_period_ns);
+  EXPECT_EQ(file.control_deadline_ns, built_in.control_deadline_ns);
+  EXPECT_EQ(file.control.mission.leg_count, built_in.control.mission.leg_count);
+  EXPECT_FLOAT_EQ(file.control.altitude_hold.kd_nspm, built_in.control.altitude_hold.kd_nspm);
+  EXPECT_FLOAT_EQ(file.control.altitude_hold.mass_kg, built_in.control.altitude_hold.mass_kg);
+  EXPECT_EQ(file.control_thread.priority, built_in.control_thread.priority);
+  EXPECT_EQ(file.control.link_age_limit_ns, built_in.control.link_age_limit_ns);
+}
+
+TEST_F(ConfigTest, LaterFilesOverrideSingleKeys) {
+  const auto path = write("[control]\ndeadline_us = 7000\n");
+  const Config c = load_config({WASP_SOURCE_DIR "/config/wasp.toml", path}, kNames);
+  EXPECT_EQ(c.control_deadline_ns, 7 * kMillisecond);
+  EXPECT_EQ(c.control_period_ns, 50 * kMillisecond);
+  EXPECT_EQ(c.control.mission.leg_count, 2);
+}
+
+TEST_F(ConfigTest, UnknownKeyNamesFileAndLine) {
+  const std::string e = error_of("[control]\nrate_hz = 20.0\nturbo = true\n");
+  EXPECT_NE(e.find("turbo"), std::string::npos) << e;
+  EXPECT_NE(e.find(":3"), std::string::npos) << e;
+}
+
+TEST_F(ConfigTest, UnknownSectionsAreErrorsToo) {
+  EXPECT_NE(error_of("[controll]\nrate_hz = 20.0\n").find("controll"), std::string::npos);
+  EXPECT_NE(error_of("[behaviour.teleport]\npriority = 3\n").find("teleport"), std::string::npos);
+  EXPECT_NE(error_of("[threads.ghost]\npriority = 3\n").find("ghost"), std::string::npos);
+}
+
+TEST_F(ConfigTest, OutOfRangeNamesTheRange) {
+  const std::string e = error_of("[threads.control]\npriority = 120\n");
+  EXPECT_NE(e.find("1 ... 99"), std::string::npos) << e;
+  EXPECT_FALSE(error_of("[control]\nrate_hz = nan\n").empty());
+  EXPECT_FALSE(error_of("[mission]\nheights_m = [0.5]\nseconds = [1.0, 2.0]\n").empty());
+  EXPECT_FALSE(error_of("[control]\nmass_kg = 9.0\n").empty());
+}
+
+TEST_F(ConfigTest, WrongTypesAndBrokenSyntax) {
+  EXPECT_FALSE(error_of("[control]\nrate_hz = \"fast\"\n").empty());
+  EXPECT_FALSE(error_of("[threads.control]\npriority = 3.5\n").empty());
+  EXPECT_FALSE(error_of("[run]\nstrict_syscalls = 1\n").empty());
+  EXPECT_FALSE(error_of("[camera]\ndriver = \"crystal ball\"\n").empty());
+  EXPECT_FALSE(error_of("control = 3\n").empty());
+  EXPECT_FALSE(error_of("[control\n").empty());
+}
+
+TEST_F(ConfigTest, AMissingFileIsNamed) {
+  try {
+    load_config({"/nowhere/wasp.toml"}, kNames);
+    FAIL();
+  } catch (const ConfigError& e) {
+    EXPECT_NE(std::string(e.what()).find("/nowhere/wasp.toml"), std::string::npos);
+  }
+}
+
+}  // namespace
+}  // namespace wasp::scheduling

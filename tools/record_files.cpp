@@ -1,0 +1,92 @@
+// The files of a recording apart from its tables: the folder in TUM layout, camera.toml, stages.json, record.json.
+#include <fmt/format.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+#include "rt/clock.h"
+#include "tools/record_session.h"
+#include "types/camera.h"
+
+namespace wasp::tools {
+namespace {
+
+constexpr const char* kTables[] = {"imu.csv", "attitude.csv", "cues.csv", "commands.csv"};
+
+/// Whole or not at all: written beside and renamed. A refused write leaves the old file.
+void replace_file(const std::filesystem::path& path, const std::string& content) {
+  const std::filesystem::path beside = path.string() + ".part";
+  bool ok = false;
+  {
+    std::ofstream out(beside, std::ios::binary | std::ios::trunc);
+    ok = static_cast<bool>(out << content << std::flush);
+  }
+  std::error_code error;
+  if (ok) std::filesystem::rename(beside, path, error);
+  else std::filesystem::remove(beside, error);
+}
+
+std::string text_of(const nlohmann::json& document, int indent) {
+  return document.dump(indent, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+}
+
+/// The table under a second name; where the file system has no hard links, a symbolic one.
+void link_table(const std::filesystem::path& log, const std::filesystem::path& recording, const char* name) {
+  std::filesystem::remove(recording / name);
+  std::error_code error;
+  std::filesystem::create_hard_link(log / name, recording / name, error);
+  if (error) std::filesystem::create_symlink(std::filesystem::path("../log") / name, recording / name);
+}
+
+}  // namespace
+
+void RecordSession::open_recording() {
+  const auto recording = options_.directory / "recording";
+  std::filesystem::create_directories(recording);
+  rgb_ = std::make_unique<ImageStream>(recording, "rgb");
+  depth_ = std::make_unique<ImageStream>(recording, "depth");
+  pool_ = std::make_unique<ImagePool>();
+  for (const char* name : kTables) link_table(options_.directory / "log", recording, name);
+  if (options_.camera_toml.empty()) return;
+  std::filesystem::copy_file(options_.camera_toml, recording / "camera.toml",
+                             std::filesystem::copy_options::overwrite_existing);
+}
+
+/// Width and height from the frames, the Kinect's usual intrinsics scaled to them.
+void RecordSession::write_camera_toml() const {
+  if (!options_.camera_toml.empty() || !frame_size_) return;
+  const Intrinsics usual;
+  const double scale = static_cast<double>(frame_size_->width_px) / usual.width_px;
+  const auto focal = [scale](float f) { return static_cast<double>(f) * scale; };
+  const auto centre = [scale](float c) { return (static_cast<double>(c) + 0.5) * scale - 0.5; };
+  replace_file(options_.directory / "recording" / "camera.toml",
+               fmt::format("# Size from the frames; the rest is the usual Kinect geometry, not measured.\n"
+                           "width_px = {}\nheight_px = {}\nfx_px = {:.6f}\nfy_px = {:.6f}\ncx_px = {:.6f}\ncy_px = {:.6f}\n"
+                           "pitch_down_deg = 0.0\ndepth_units_per_m = 1000\nposition_body_m = [0.0, 0.0, 0.0]\n",
+                           frame_size_->width_px, frame_size_->height_px, focal(usual.fx_px), focal(usual.fy_px),
+                           centre(usual.cx_px), centre(usual.cy_px)));
+}
+
+void RecordSession::write_stages() const {
+  if (stages_.empty() && !run_.present) return;
+  replace_file(log("stages.json"), text_of(latency_json(stages_, run_, true), -1));
+}
+
+void RecordSession::write_account(const std::string& reason) const {
+  nlohmann::json topics = nlohmann::json::array(), events = nlohmann::json::array();
+  for (const auto& [key, c] : counts_) {
+    std::uint64_t failed = 0;
+    if (pool_ && c.type == "Frame") failed = pool_->failed(c.topic == "depth" ? *depth_ : *rgb_);
+    topics.push_back({{"region", c.region}, {"topic", c.topic}, {"type", c.type}, {"recorded", c.taken}, {"lost", c.lost},
+                      {"before_attach", c.before_attach}, {"rejected", c.rejected}, {"refused_by_disk", failed},
+                      {"polls_with_queue_full", c.queue_full}, {"kept", c.type != "Frame" || options_.frames}});
+  }
+  for (const auto& e : events_) events.push_back({{"at_ns", e.at_ns}, {"region", e.region}, {"what", e.what}});
+  replace_file(log("record.json"), text_of({{"instance", options_.instance}, {"started_at_ns", started_at_ns_},
+                                            {"ended_at_ns", rt::now()}, {"reason", reason}, {"topics", topics},
+                                            {"lines_refused_by_disk", refused_lines()}, {"events", events},
+                                            {"events_dropped", events_dropped_}}, 2));
+}
+
+}  // namespace wasp::tools

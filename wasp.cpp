@@ -1,0 +1,58 @@
+// The table of contents: config -> shared memory -> drivers -> thread table -> run.
+//
+// `wasp flight` is the flying process, alone in this binary so that it stays lean; every other subcommand is a program
+// of its own beside it (`wasp top` runs `wasp-top`).
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <string>
+
+#include "rt/contract.h"
+#include "scheduling/flight.h"
+#include "vision/edge_altitude.h"
+#include "vision/ground_altitude.h"
+
+namespace {
+
+using namespace wasp;
+
+// A new behaviour is one file pair in vision/, one row here, and one section in config/wasp.toml.
+const scheduling::BehaviourTable kBehaviours = {
+    scheduling::behaviour_row<vision::GroundAltitude>(),
+    scheduling::behaviour_row<vision::EdgeAltitude>(),
+};
+
+constexpr const char* kUsage =
+    "usage: wasp SUBCOMMAND [options]    (wasp SUBCOMMAND --help for each)\n"
+    "  fly      fly a mission, in the simulator or on a recording, and write a report\n"
+    "  flight   the flying process alone (fly starts it)\n"
+    "  sim      the simulator: camera and autopilot as another process\n"
+    "  top      live rates, ages and latencies of a running flight, read-only\n"
+    "  record   log a running flight, read-only\n"
+    "  report   make report.html of a logged flight\n"
+    "  eval     run one vision kernel over a folder of recordings\n"
+    "  bench    benchmarks: ipc, vision, micro\n";
+
+int run_sister(const char* name, char** argv) {
+  const std::string program = (std::filesystem::read_symlink("/proc/self/exe").parent_path() / (std::string("wasp-") + name)).string();
+  execv(program.c_str(), argv);
+  std::fprintf(stderr, "wasp: no subcommand '%s' (%s: %s)\n%s", name, program.c_str(), std::strerror(errno), kUsage);
+  return 2;
+}
+
+}  // namespace
+
+/// Depth of real-time sections of the calling thread, for an allocator guard loaded beside this program.
+extern "C" int wasp_realtime_depth() { return rt::realtime_depth; }
+
+int main(int argc, char** argv) {
+  if (argc < 2 || std::strcmp(argv[1], "--help") == 0 || std::strcmp(argv[1], "-h") == 0) {
+    std::fputs(kUsage, argc < 2 ? stderr : stdout);
+    return argc < 2 ? 2 : 0;
+  }
+  if (std::strcmp(argv[1], "flight") == 0) return scheduling::flight_main(kBehaviours, argc - 1, argv + 1);
+  return run_sister(argv[1], argv + 1);
+}
