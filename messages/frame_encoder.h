@@ -9,7 +9,7 @@
 
 namespace wasp::mavlink {
 
-/// One sender on one link: owns the sequence counter. Realtime-safe: yes, all of it.
+/// One sender on one link: owns the sequence counter, which threads may share. Realtime-safe: yes, all of it.
 class Encoder {
  public:
   Encoder(std::uint8_t system_id, std::uint8_t component_id) noexcept
@@ -42,8 +42,7 @@ class Encoder {
 
   [[nodiscard]] std::uint8_t system_id() const noexcept { return system_id_; }
   [[nodiscard]] std::uint8_t component_id() const noexcept { return component_id_; }
-  /// Sequence number of the next frame.
-  [[nodiscard]] std::uint8_t sequence() const noexcept { return sequence_; }
+  /// Sets the sequence number of the next frame.
   void set_sequence(std::uint8_t next) noexcept { sequence_ = next; }
 
  private:
@@ -51,7 +50,7 @@ class Encoder {
                     std::uint8_t incompat_flags, std::span<std::uint8_t> out) WASP_REALTIME;
 
   std::uint8_t system_id_, component_id_;
-  std::uint8_t sequence_ = 0;
+  std::uint8_t sequence_ = 0;  ///< counted up through atomic_ref
 };
 
 }  // namespace wasp::mavlink

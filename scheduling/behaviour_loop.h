@@ -71,16 +71,18 @@ class BehaviourLoop {
     if (wiring_.script != nullptr) {
       const ScriptedStep* step = find_step(*wiring_.script, frame.header.sequence);
       if (step == nullptr) return frame.header.sequence > wiring_.script->back().frame_sequence;  // a later lap: no attitude
+      input.exposed_at_ns = step->exposed_at_ns;  // the recording's own time: what the first step was given
       input.attitude_valid = step->attitude_valid;
       input.attitude = step->attitude;
     } else if (wiring_.attitude_from_link) {
       input.attitude_valid = attitude_at(attitude_, input.exposed_at_ns, input.attitude);
     }
+    input.attitude.exposed_at_ns = input.exposed_at_ns;
     return true;
   }
 
   void publish(const Frame& frame, const BehaviourInput& input, Cue& cue) WASP_REALTIME {
-    cue.exposed_at_ns = input.exposed_at_ns;
+    cue.exposed_at_ns = frame.header.exposed_at_ns;
     cue.released_at_ns = frame.sample.published_at_ns;
     cue.behaviour = wiring_.index;
     cue.frame_sequence = input.frame_sequence;

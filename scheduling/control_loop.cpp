@@ -9,7 +9,6 @@ namespace wasp::scheduling {
 namespace {
 
 constexpr DurationNs kHeartbeatPeriod = 1 * kSecond;
-constexpr DurationNs kTimesyncPeriod = 200 * kMillisecond;
 constexpr DurationNs kRequestPeriod = 500 * kMillisecond;
 constexpr int kMissesBeforeHold = 2;
 
@@ -93,7 +92,7 @@ void ControlLoop::mean_acceleration(control::ControlInput& input) WASP_REALTIME 
 void ControlLoop::send(const control::ControlOutput& output, Command& command, TimeNs now_ns) WASP_REALTIME {
   std::size_t used = 0;
   if (command.sent != 0)
-    used = wiring_.autopilot->encode_attitude_target(now_ns, command.q_ned_body, command.yaw_rate_radps, command.thrust, out_);
+    used = wiring_.autopilot->encode_attitude_target({command.q_ned_body, true, command.yaw_rate_radps, command.thrust}, now_ns, out_);
   const std::size_t setpoint_bytes = used;
   used = append_requests(output, used, now_ns);
   if (used == 0) return;
@@ -106,16 +105,12 @@ std::size_t ControlLoop::append_requests(const control::ControlOutput& output, s
   const auto rest = [&] { return std::span<std::uint8_t>(out_).subspan(used); };
   drivers::AutopilotLink& link = *wiring_.autopilot;
   if (now_ns >= heartbeat_due_ns_) {
-    used += link.encode_heartbeat(rest());
+    used += link.encode_heartbeat(mavlink::mav_state::kActive, rest());
     heartbeat_due_ns_ = now_ns + kHeartbeatPeriod;
   }
-  if (now_ns >= timesync_due_ns_) {
-    used += link.encode_timesync_request(now_ns, rest());
-    timesync_due_ns_ = now_ns + kTimesyncPeriod;
-  }
   if ((output.ask_arm || output.ask_disarm) && now_ns >= request_due_ns_) {
-    if (output.ask_arm) used += link.encode_set_mode(static_cast<std::uint32_t>(config_.follow_mode), rest());
-    used += link.encode_arm(output.ask_arm, rest());
+    if (output.ask_arm) used += link.encode_set_mode(static_cast<std::uint32_t>(config_.follow_mode), 0, 0, rest());
+    used += link.encode_arm(output.ask_arm, 0, rest());
     request_due_ns_ = now_ns + kRequestPeriod;
   }
   return used;

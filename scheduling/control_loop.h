@@ -1,6 +1,6 @@
 // The control thread: every period on the grid it gathers cues, attitude and acceleration, runs control_step, and hands
-// the command to the serial line in one write. It waits for nobody; what is not there is absent. Heartbeat, TIMESYNC
-// requests and arming go out from here too, so that one thread owns what the autopilot hears.
+// the command to the serial line in one write. It waits for nobody; what is not there is absent. The
+// heartbeat and arming go out from here too: what keeps the autopilot following comes from one thread.
 #pragma once
 
 #include <array>
@@ -65,7 +65,7 @@ class ControlLoop {
   Stage *wake_, *compute_, *write_, *tick_to_byte_;
   std::array<std::uint8_t, 1024> out_{};
   std::array<TimeNs, control::kMaxBehaviours> last_exposed_{};
-  TimeNs heartbeat_due_ns_ = 0, timesync_due_ns_ = 0, request_due_ns_ = 0;
+  TimeNs heartbeat_due_ns_ = 0, request_due_ns_ = 0;
   int consecutive_misses_ = 0;
   FlightMode announced_mode_ = FlightMode::kDisarmed;
   std::uint8_t announced_phase_ = 255;

@@ -65,7 +65,7 @@ std::map<std::string, BehaviourScript> load_replay_script(const std::string& fol
     ScriptedStep step;
     step.frame_sequence = parse<std::uint32_t>(cells, frame, where);
     step.attitude_valid = parse<int>(cells, valid, where) != 0;
-    step.attitude.exposed_at_ns = parse<TimeNs>(cells, exposed, where);
+    step.exposed_at_ns = parse<TimeNs>(cells, exposed, where);
     for (std::size_t i = 0; i < 4; ++i) step.attitude.q_ned_body[i] = parse<float>(cells, q + i, where);
     for (std::size_t i = 0; i < 3; ++i) step.attitude.rate_body_radps[i] = parse<float>(cells, rate + i, where);
     if (name >= cells.size()) throw std::runtime_error(where + ": too few columns");

@@ -12,6 +12,7 @@ namespace wasp::scheduling {
 
 struct ScriptedStep {
   std::uint32_t frame_sequence = 0;
+  TimeNs exposed_at_ns = 0;
   bool attitude_valid = false;
   AttitudeSample attitude;
 };

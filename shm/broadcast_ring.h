@@ -36,6 +36,11 @@ class RingWriter {
     std::atomic_thread_fence(std::memory_order_release);
     return slot + sizeof(SlotHeader);
   }
+  /// Optional, before the last few microseconds of work on a loan: wakes sleeping readers early, so that they are awake
+  /// when publish() comes. Use it only if publish() follows within Bell::kAnnounceSpin.
+  void announce() WASP_REALTIME {
+    if (bell_ != nullptr) bell_->announce();
+  }
   /// Makes the loaned message visible and rings the bell.
   void publish(TimeNs published_at_ns) WASP_REALTIME {
     const std::uint64_t n = published() + 1;

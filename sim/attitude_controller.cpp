@@ -8,11 +8,11 @@
 namespace wasp::sim {
 namespace {
 
-constexpr double kAngleGain_ps = 4.0;      ///< K_p-dot of (B.19)
-constexpr double kRateGain_ps = 11.0;      ///< K_p of (B.20), per unit of inertia
+constexpr double kAngleGain_ps = 4.0;  ///< K_p-dot of (B.19)
+constexpr double kRateGain_ps = 11.0;  ///< K_p of (B.20), per unit of inertia
 constexpr double kMaxRate_radps = 2.5;
-constexpr double kYawGain_ps = 3.0;        ///< K_py of (B.17), per unit of inertia
-constexpr double kHeadingGain_ps = 1.2;    ///< (B.18)
+constexpr double kYawGain_ps = 3.0;      ///< K_py of (B.17), per unit of inertia
+constexpr double kHeadingGain_ps = 1.2;  ///< (B.18)
 constexpr double kHeadingIntegral_ps2 = 0.1;
 constexpr double kMaxYawRate_radps = 1.0;
 constexpr double kMaxYawTorque_Nm = 0.025;  ///< keeps room for roll and pitch near full collective
@@ -25,7 +25,8 @@ double AttitudeController::yaw_rate_wanted(const AttitudeSetpoint& setpoint, flo
     return std::clamp(static_cast<double>(setpoint.yaw_rate_radps), -kMaxYawRate_radps, kMaxYawRate_radps);
   }
   const auto error = static_cast<double>(wrap_angle(setpoint.euler.yaw_rad - yaw_rad));
-  heading_integral_ = std::clamp(heading_integral_ + kHeadingIntegral_ps2 * error * static_cast<double>(dt_s), -0.1, 0.1);
+  heading_integral_ =
+      std::clamp(heading_integral_ + kHeadingIntegral_ps2 * error * static_cast<double>(dt_s), -0.1, 0.1);
   return std::clamp(kHeadingGain_ps * error + heading_integral_, -kMaxYawRate_radps, kMaxYawRate_radps);
 }
 
@@ -36,8 +37,8 @@ std::array<double, 4> AttitudeController::step(const AttitudeSetpoint& setpoint,
     return inertia * kRateGain_ps * (wanted - static_cast<double>(rate));
   };
   const InertiaRow& I = params_.inertia_kgm2;
-  const double yaw = I.zz * kYawGain_ps *
-                     (yaw_rate_wanted(setpoint, euler.yaw_rad, dt_s) - static_cast<double>(rate_body_radps.z()));
+  const double yaw =
+      I.zz * kYawGain_ps * (yaw_rate_wanted(setpoint, euler.yaw_rad, dt_s) - static_cast<double>(rate_body_radps.z()));
   return mix_rotors(params_, static_cast<double>(setpoint.thrust) * params_.max_collective_N(),
                     {torque(I.xx, setpoint.euler.roll_rad - euler.roll_rad, rate_body_radps.x()),
                      torque(I.yy, setpoint.euler.pitch_rad - euler.pitch_rad, rate_body_radps.y()),

@@ -11,8 +11,8 @@ namespace wasp::sim {
 
 class AttitudeEstimator {
  public:
-  /// One IMU sample. `still`: known to rest, so that the accelerometer is to be believed. `tilt_rad` >= 0: the larger of
-  /// commanded and estimated tilt.
+  /// One IMU sample. `still`: known to rest, so that the accelerometer is to be believed. `tilt_rad` >= 0: the larger
+  /// of commanded and estimated tilt.
   void step(const ImuSample& imu, float dt_s, bool still, float tilt_rad) noexcept;
 
   [[nodiscard]] Euler euler() const noexcept { return {roll_.angle_rad(), pitch_.angle_rad(), yaw_.angle_rad()}; }

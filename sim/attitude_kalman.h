@@ -1,5 +1,5 @@
-// One axis of attitude: state [angle, gyro bias], driven by the gyro, corrected by an angle (B.23 ... B.31 with the terms
-// that (B.28) and (B.29) lose put back). A = [1 -dt; 0 1], B = [dt; 0], H = [1 0].
+// One axis of attitude: state [angle, gyro bias], driven by the gyro, corrected by an angle (B.23 ... B.31 with the
+// terms that (B.28) and (B.29) lose put back). A = [1 -dt; 0 1], B = [dt; 0], H = [1 0].
 #pragma once
 
 namespace wasp::sim {

@@ -1,7 +1,7 @@
-// The autopilot's side of the serial line: MAVLink 2 as system 1, component 1. Sends HEARTBEAT 1 Hz, ATTITUDE_QUATERNION
-// 100 Hz, HIGHRES_IMU 200 Hz, its own TIMESYNC requests 1 Hz, STATUSTEXT on events; answers TIMESYNC; obeys
-// COMMAND_LONG 400 (arm) and 176 (mode), acknowledges every command; follows SET_ATTITUDE_TARGET.
-// Its clock runs at an offset from the simulator's, so that a companion must synchronise.
+// The autopilot's side of the serial line: MAVLink 2 as system 1, component 1. Sends HEARTBEAT 1 Hz,
+// ATTITUDE_QUATERNION 100 Hz, HIGHRES_IMU 200 Hz, its own TIMESYNC requests 1 Hz, STATUSTEXT on events; answers
+// TIMESYNC; obeys COMMAND_LONG 400 (arm) and 176 (mode), acknowledges every command; follows SET_ATTITUDE_TARGET. Its
+// clock runs at an offset from the simulator's, so that a companion must synchronise.
 #pragma once
 
 #include <cstdint>

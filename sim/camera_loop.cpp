@@ -70,7 +70,7 @@ void CameraLoop::run(const std::atomic<bool>& stop) {
     skipped_ += release.skipped;
     BodyPose pose;
     if (!pose_at(release.due_at_ns, stop, pose)) {
-      ++skipped_;
+      if (!stop.load(std::memory_order_relaxed)) ++skipped_;
       continue;
     }
     const TimeNs began_ns = rt::now();

@@ -1,5 +1,5 @@
-// The camera in real time: exposures on an absolute grid; the pose at the exposure's instant is interpolated between the
-// vehicle's ticks; both images are rendered straight into loaned ring slots and published with the same sequence.
+// The camera in real time: exposures on an absolute grid; the pose at the exposure's instant is interpolated between
+// the vehicle's ticks; both images are rendered straight into loaned ring slots and published with the same sequence.
 #pragma once
 
 #include <atomic>
@@ -19,7 +19,9 @@ class CameraLoop {
   /// Runs until `stop`. Call from one thread.
   void run(const std::atomic<bool>& stop);
   [[nodiscard]] std::uint64_t frames() const { return gray_.published(); }
-  [[nodiscard]] std::uint64_t skipped() const { return skipped_; }  ///< exposures missed because rendering took too long
+  [[nodiscard]] std::uint64_t skipped() const {
+    return skipped_;
+  }  ///< exposures missed because rendering took too long
   [[nodiscard]] const rt::Histogram& render_time() const { return render_time_; }
 
   /// Topics of a camera region with frames of this size.

@@ -15,10 +15,10 @@ struct ImuParams {
   double gyro_bias_radps = 0.01;        ///< standard deviation of the constant bias
   double gyro_walk_radps_sqrts = 2e-5;  ///< random walk [rad/s per root second]
   double accel_noise_mps2 = 0.08;
-  double accel_bias_mps2 = 0.02;        ///< what calibration leaves
+  double accel_bias_mps2 = 0.02;  ///< what calibration leaves
   double accel_walk_mps2_sqrts = 2e-4;
   double mag_noise_gauss = 0.004;
-  double pressure_noise_hpa = 0.02;     ///< 0.17 m
+  double pressure_noise_hpa = 0.02;  ///< 0.17 m
 };
 
 /// Field of the laboratory, NED: pointing north and down, no declination [gauss].

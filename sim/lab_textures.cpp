@@ -59,7 +59,8 @@ double text_shade(double u, double v, std::uint32_t seed) {
   const auto line = static_cast<std::uint32_t>(v * 24);
   const double indent = 0.05 + 0.1 * static_cast<double>(mix(seed, line) % 3);
   const double length = 0.3 + 0.6 * static_cast<double>(uniform_of(mix(seed + 1, line)));
-  const bool ink = v * 24 - line > 0.35 && u > indent && u < length && mix(seed + 2, line * 97 + static_cast<std::uint32_t>(u * 60)) % 4 != 0;
+  const bool ink = v * 24 - line > 0.35 && u > indent && u < length &&
+                   mix(seed + 2, line * 97 + static_cast<std::uint32_t>(u * 60)) % 4 != 0;
   return ink ? 0.85 : 0.12;
 }
 

@@ -10,12 +10,22 @@ namespace wasp::sim {
 
 /// Index of each texture in World::textures.
 enum LabTexture : int {
-  kFloor, kDetail, kPlaster, kWood, kCardboard, kBooks, kScreen, kCeiling, kWhiteboard, kPlain, kLabTextureCount
+  kFloor,
+  kDetail,
+  kPlaster,
+  kWood,
+  kCardboard,
+  kBooks,
+  kScreen,
+  kCeiling,
+  kWhiteboard,
+  kPlain,
+  kLabTextureCount
 };
 
 inline constexpr int kFloorTexels = 2048;
-inline constexpr double kFloorTexel_m = 0.006;                           ///< 6 mm
-inline constexpr double kFloorRepeat_m = kFloorTexels * kFloorTexel_m;   ///< 12.3 m: the floor never repeats
+inline constexpr double kFloorTexel_m = 0.006;                          ///< 6 mm
+inline constexpr double kFloorRepeat_m = kFloorTexels * kFloorTexel_m;  ///< 12.3 m: the floor never repeats
 
 /// A dark patch on the floor where furniture keeps the light away, in floor coordinates (x, y) from the floor's corner.
 struct FloorShadow {

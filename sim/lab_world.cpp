@@ -69,7 +69,7 @@ class LabBuilder {
       box(x + 0.8f, 4.96f, 1.0f, {0.06f, 0.05f, 1.4f}, 0, {kPlain, 1.f, 0.6f});
       box(x + 0.8f, 4.93f, 0.95f, {1.8f, 0.14f, 0.05f}, 0, {kPlain, 1.f, 0.8f});
     }
-    world_.add_quad({7.97f, -1.8f, -2.1f}, {0, 2.4f, 0}, {0, 0, 1.2f}, {kWhiteboard, 2.4f, 1.1f});
+    world_.add_quad({7.97f, -1.4f, -2.5f}, {0, 1.6f, 0}, {0, 0, 1.6f}, {kWhiteboard, 1.6f, 1.1f});
     box(7.96f, 3.6f, 0, {0.06f, 1.0f, 2.1f}, 0, {kWood, 2.f, 0.62f});
     box(7.91f, 3.22f, 1.0f, {0.06f, 0.12f, 0.04f}, 0, {kPlain, 1.f, 0.25f});
   }
@@ -83,7 +83,8 @@ class LabBuilder {
     };
     put(0, 0, 0.71f, {0.8f, length, 0.04f}, {kWood, 1.5f, 1.15f});
     for (const float dx : {-0.36f, 0.36f})
-      for (const float dy : {-0.5f, 0.5f}) put(dx, dy * (length - 0.12f), 0, {0.05f, 0.05f, 0.71f}, {kPlain, 1.f, 0.35f});
+      for (const float dy : {-0.5f, 0.5f})
+        put(dx, dy * (length - 0.12f), 0, {0.05f, 0.05f, 0.71f}, {kPlain, 1.f, 0.35f});
     put(0.36f, 0, 0.30f, {0.02f, length - 0.2f, 0.35f}, {kPlain, 1.f, 0.55f});
     for (float dy = -length / 2 + 0.5f; dy < length / 2; dy += 1.1f) monitor(put, dy + between(-0.1, 0.1));
     put(-0.1f, length / 2 - 0.35f, 0.75f, {0.25f, 0.32f, between(0.1, 0.3)}, {kCardboard, 0.4f, 1.f});
@@ -114,7 +115,8 @@ class LabBuilder {
     for (int level = 0; level < 5; ++level) {
       const float up = 0.05f + 0.4f * static_cast<float>(level);
       box(x, y, up, {0.35f, length, 0.03f}, yaw, {kWood, 1.5f, 0.8f});
-      if (level < 4) box(x + 0.06f * c, y + 0.06f * s, up + 0.03f, {0.22f, length - 0.1f, 0.28f}, yaw, {kBooks, 0.9f, 1.f});
+      if (level < 4)
+        box(x + 0.06f * c, y + 0.06f * s, up + 0.03f, {0.22f, length - 0.1f, 0.28f}, yaw, {kBooks, 0.9f, 1.f});
     }
     for (const float end : {-0.5f, 0.5f})
       box(x - s * end * length, y + c * end * length, 0, {0.35f, 0.03f, 1.8f}, yaw, {kWood, 1.5f, 0.7f});

@@ -1,6 +1,6 @@
-// The autopilot's end of a serial line: a raw pseudo-terminal whose slave a symbolic link names. The simulator keeps the
-// slave open itself, so that the line survives a companion that closes and reopens it. Never blocks: when nobody reads,
-// new output is dropped in whole pieces, as a wire without a listener does.
+// The autopilot's end of a serial line: a raw pseudo-terminal whose slave a symbolic link names. The simulator keeps
+// the slave open itself, so that the line survives a companion that closes and reopens it. Never blocks: when nobody
+// reads, new output is dropped in whole pieces, as a wire without a listener does.
 #pragma once
 
 #include <cstdint>
@@ -14,8 +14,8 @@ namespace wasp::sim {
 
 class Pty {
  public:
-  /// Throws std::runtime_error naming the path and the reason. An old symbolic link at `link_path` is replaced, anything
-  /// else there is not touched.
+  /// Throws std::runtime_error naming the path and the reason. An old symbolic link at `link_path` is replaced,
+  /// anything else there is not touched.
   explicit Pty(std::string link_path);
   ~Pty();  ///< removes the link
   Pty(const Pty&) = delete;

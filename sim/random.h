@@ -1,5 +1,6 @@
-// Counter-based random numbers: a value is a pure function of (seed, counter), so any order of evaluation gives the same
-// numbers. The mixer is the "lowbias32" integer hash (C. Wellons, hash-prospector), 32-bit so that compilers vectorise it.
+// Counter-based random numbers: a value is a pure function of (seed, counter), so any order of evaluation gives the
+// same numbers. The mixer is the "lowbias32" integer hash (C. Wellons, hash-prospector), 32-bit so that compilers
+// vectorise it.
 #pragma once
 
 #include <cmath>
@@ -17,7 +18,9 @@ constexpr std::uint32_t mix(std::uint32_t x) {
   return x;
 }
 
-constexpr std::uint32_t mix(std::uint32_t seed, std::uint32_t counter) { return mix(seed ^ mix(counter + 0x9e3779b9U)); }
+constexpr std::uint32_t mix(std::uint32_t seed, std::uint32_t counter) {
+  return mix(seed ^ mix(counter + 0x9e3779b9U));
+}
 
 /// Uniform in [0, 1).
 constexpr float uniform_of(std::uint32_t hash) { return static_cast<float>(hash >> 8) * 0x1p-24f; }
@@ -33,7 +36,7 @@ class Random {
  public:
   explicit Random(std::uint32_t seed) : seed_(mix(seed)) {}
   std::uint32_t bits() { return mix(seed_, counter_++); }
-  double uniform() { return uniform_of(bits()); }                                   ///< [0, 1)
+  double uniform() { return uniform_of(bits()); }  ///< [0, 1)
   double uniform(double low, double high) { return low + (high - low) * uniform(); }
   double exponential(double mean) { return -mean * std::log(1.0 - uniform()); }
   /// Unit normal by Box and Muller.

@@ -28,7 +28,8 @@ Eigen::Vector2d undistort(double xd, double yd, const Intrinsics& k) {
   double x = xd, y = yd;
   for (int i = 0; i < 20; ++i) {
     const double r2 = x * x + y * y;
-    const double radial = 1 + r2 * (static_cast<double>(k.k1) + r2 * (static_cast<double>(k.k2) + r2 * static_cast<double>(k.k3)));
+    const double radial =
+        1 + r2 * (static_cast<double>(k.k1) + r2 * (static_cast<double>(k.k2) + r2 * static_cast<double>(k.k3)));
     const double p1 = static_cast<double>(k.p1), p2 = static_cast<double>(k.p2);
     x = (xd - 2 * p1 * x * y - p2 * (r2 + 2 * x * x)) / radial;
     y = (yd - p1 * (r2 + 2 * y * y) - 2 * p2 * x * y) / radial;
@@ -82,7 +83,8 @@ struct Renderer::Scene {
 
 Renderer::Renderer(World world, const Intrinsics& intrinsics)
     : world_(std::move(world)), intrinsics_(intrinsics), scene_(std::make_unique<Scene>()) {
-  if (intrinsics.width_px <= 0 || intrinsics.height_px <= 0 || intrinsics.width_px % 4 != 0 || intrinsics.height_px % 4 != 0)
+  if (intrinsics.width_px <= 0 || intrinsics.height_px <= 0 || intrinsics.width_px % 4 != 0 ||
+      intrinsics.height_px % 4 != 0)
     throw std::runtime_error("renderer: image size " + std::to_string(intrinsics.width_px) + " x " +
                              std::to_string(intrinsics.height_px) + " is not a positive multiple of 4");
   build_rays();
@@ -103,7 +105,8 @@ void Renderer::build_rays() {
         const int u = column * 4 + i % 4, v = row * 4 + i / 4;
         const Eigen::Vector2d ray = undistort((u - static_cast<double>(k.cx_px)) / static_cast<double>(k.fx_px),
                                               (v - static_cast<double>(k.cy_px)) / static_cast<double>(k.fy_px), k);
-        Packet& packet = packets_[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns) + static_cast<std::size_t>(column)];
+        Packet& packet = packets_[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns) +
+                                  static_cast<std::size_t>(column)];
         packet.x[i] = static_cast<float>(ray.x());
         packet.y[i] = static_cast<float>(ray.y());
       }
@@ -126,7 +129,8 @@ void Renderer::build_scene() {
   rtcAttachGeometry(scene_->scene, geometry);
   rtcReleaseGeometry(geometry);
   rtcCommitScene(scene_->scene);
-  if (rtcGetDeviceError(scene_->device) != RTC_ERROR_NONE) throw std::runtime_error("renderer: Embree cannot build the scene");
+  if (rtcGetDeviceError(scene_->device) != RTC_ERROR_NONE)
+    throw std::runtime_error("renderer: Embree cannot build the scene");
 }
 
 void Renderer::render_band(const CameraPose& pose, int first_row, float* luminance, float* depth_m) const {

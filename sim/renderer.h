@@ -28,8 +28,9 @@ class Renderer {
   Renderer(Renderer&&) noexcept;
   Renderer& operator=(Renderer&&) noexcept;
 
-  /// Rows [first_row, first_row + kBandRows): `luminance` in pixel values (0 ... about 255, not clamped), `depth_m` along
-  /// the optical axis (0 where nothing is hit); both row-major, kBandRows x width. first_row is a multiple of kBandRows.
+  /// Rows [first_row, first_row + kBandRows): `luminance` in pixel values (0 ... about 255, not clamped), `depth_m`
+  /// along the optical axis (0 where nothing is hit); both row-major, kBandRows x width. first_row is a multiple of
+  /// kBandRows.
   void render_band(const CameraPose& pose, int first_row, float* luminance, float* depth_m) const;
 
   [[nodiscard]] int width_px() const { return intrinsics_.width_px; }

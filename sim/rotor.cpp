@@ -15,7 +15,8 @@ double Rotor::voltage(double wanted_radps) const {
   const double k = params_.motor_constant;
   const double steady_V = k * wanted_radps + resistance_ohm_ * d_ * wanted_radps * wanted_radps / k;
   // The natural pole (B.7) is slower than the regulator's; the difference is made up in proportion to the error.
-  const double natural = k * k / (params_.inertia_kgm2 * resistance_ohm_) + 2 * d_ * wanted_radps / params_.inertia_kgm2;
+  const double natural =
+      k * k / (params_.inertia_kgm2 * resistance_ohm_) + 2 * d_ * wanted_radps / params_.inertia_kgm2;
   const double gain = (1 / params_.regulator_s - natural) * params_.inertia_kgm2 * resistance_ohm_ / k;
   return std::clamp(steady_V + std::max(0.0, gain) * (wanted_radps - speed_radps_), 0.0, params_.supply_V);
 }

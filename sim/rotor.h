@@ -1,6 +1,6 @@
-// One motor with its propeller and speed regulator: dw/dt = (K/R (v - K w) - d w^2) / J (B.5). The regulator adds to the
-// steady voltage of the wanted speed what gives a first-order response; 0 ... supply voltage bounds it, so large steps
-// are slower than small ones, as on the vehicle.
+// One motor with its propeller and speed regulator: dw/dt = (K/R (v - K w) - d w^2) / J (B.5). The regulator adds to
+// the steady voltage of the wanted speed what gives a first-order response; 0 ... supply voltage bounds it, so large
+// steps are slower than small ones, as on the vehicle.
 #pragma once
 
 #include "sim/vehicle_params.h"

@@ -23,8 +23,8 @@ PilotTrim SafetyPilot::step(const VehicleState& truth, const AttitudeSetpoint& c
   const Eigen::Vector2d position = truth.position_ned_m.head<2>(), velocity = truth.velocity_ned_mps.head<2>();
   if (!holding_) hold_ned_m_ = position;
   holding_ = true;
-  const Eigen::Vector2d accel = kBandwidth_radps * kBandwidth_radps * (hold_ned_m_ - position) -
-                                2 * kDamping * kBandwidth_radps * velocity;
+  const Eigen::Vector2d accel =
+      kBandwidth_radps * kBandwidth_radps * (hold_ned_m_ - position) - 2 * kDamping * kBandwidth_radps * velocity;
   const Eigen::Vector3d forward = truth.q_ned_body * Eigen::Vector3d::UnitX();
   const Eigen::Vector2d ahead = forward.head<2>().normalized(), right(-ahead.y(), ahead.x());
   Eigen::Vector2d tilt(accel.dot(right) / kGravity_mps2, -accel.dot(ahead) / kGravity_mps2);

@@ -51,7 +51,8 @@ std::array<std::uint16_t, 2048> raw_to_mm_table(float min_range_m, float max_ran
     const float inverse = kRawOffset - kRawScale * static_cast<float>(raw);
     const float z = inverse > 0 ? 1 / inverse : 0;
     const bool in_range = z >= min_range_m && z <= max_range_m;
-    table[static_cast<std::size_t>(raw)] = in_range ? static_cast<std::uint16_t>(std::lround(z * 1000)) : std::uint16_t{0};
+    table[static_cast<std::size_t>(raw)] =
+        in_range ? static_cast<std::uint16_t>(std::lround(z * 1000)) : std::uint16_t{0};
   }
   return table;
 }
@@ -69,8 +70,8 @@ std::uint32_t SensorModel::row_key(std::uint32_t frame, int row, std::uint32_t s
   return mix(mix(seed_ + stream, frame), static_cast<std::uint32_t>(row));
 }
 
-/// The projector's column of what is seen at u is p = u - f B / z. Going left, p must fall: where it does not, something
-/// nearer stands in the light. Where it falls by less than a fifth of a pixel the light grazes.
+/// The projector's column of what is seen at u is p = u - f B / z. Going left, p must fall: where it does not,
+/// something nearer stands in the light. Where it falls by less than a fifth of a pixel the light grazes.
 void SensorModel::mark_shadows(const float* depth_m) {
   float least = 1e9f;
   for (int u = width_px_ - 1; u >= 0; --u) {

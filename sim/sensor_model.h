@@ -1,10 +1,10 @@
 // From ideal images to what a Kinect delivers.
 //
-// Depth: a structured-light camera measures disparity. Raw value r = (3.3309 - 1/z) / 0.0030711 (11 bits, the well-known
-// linear-in-disparity calibration by Magnenat and Burrus), so one step is 0.0030711 z^2 [m]. Gaussian noise of 0.36
-// steps before rounding gives, with the rounding, sigma = 1.42e-3 z^2 [m], the law measured by Khoshelham and Elberink
-// (Sensors 12, 2012). Holes: where the projector, 7.5 cm to the right, is hidden by something nearer; where it grazes;
-// outside 0.4 ... 7 m; and a few at random, more with distance.
+// Depth: a structured-light camera measures disparity. Raw value r = (3.3309 - 1/z) / 0.0030711 (11 bits, the
+// well-known linear-in-disparity calibration by Magnenat and Burrus), so one step is 0.0030711 z^2 [m]. Gaussian noise
+// of 0.36 steps before rounding gives, with the rounding, sigma = 1.42e-3 z^2 [m], the law measured by Khoshelham and
+// Elberink (Sensors 12, 2012). Holes: where the projector, 7.5 cm to the right, is hidden by something nearer; where it
+// grazes; outside 0.4 ... 7 m; and a few at random, more with distance.
 //
 // Intensity: gain, photon noise (variance in proportion to the signal) and read noise, rounded to 8 bits.
 //
@@ -18,13 +18,13 @@
 namespace wasp::sim {
 
 struct SensorParams {
-  bool noise = true;               ///< false: no noise, no quantisation, no holes but those of the range
+  bool noise = true;                ///< false: no noise, no quantisation, no holes but those of the range
   float depth_noise_steps = 0.36f;  ///< Gaussian, in raw steps, >= 0
   float min_range_m = 0.4f, max_range_m = 7.f;
-  float dropout = 0.002f;          ///< share of readings lost at random up close; grows as (z/7)^4 to ten times that
-  float gain = 1.f;                ///< pixel value per luminance
-  float read_noise = 1.2f;         ///< standard deviation, pixel values
-  float photon_noise = 0.012f;     ///< variance per pixel value
+  float dropout = 0.002f;       ///< share of readings lost at random up close; grows as (z/7)^4 to ten times that
+  float gain = 1.f;             ///< pixel value per luminance
+  float read_noise = 1.2f;      ///< standard deviation, pixel values
+  float photon_noise = 0.012f;  ///< variance per pixel value
 };
 
 /// Depth of each raw value in millimetres; 0 for values that stand for no depth.

@@ -1,8 +1,8 @@
 // One row for each key: section, name, range, and where the number goes. Booleans and arrays are numbers here too.
 #include "sim/sim_config.h"
 
-#include <functional>
 #include <fstream>
+#include <functional>
 #include <sstream>
 #include <stdexcept>
 #include <toml.hpp>
@@ -30,6 +30,7 @@ Row row(const char* section, const char* key, double low, double high, Number& (
 
 const std::vector<Row>& rows() {
   using D = Draft;
+  // clang-format off
   static const std::vector<Row> kRows{
       row<std::uint32_t>("run", "seed", 0, 4294967295.0, [](D& d) -> std::uint32_t& { return d.config.seed; }),
       row<bool>("run", "safety_pilot", 0, 1, [](D& d) -> bool& { return d.config.safety_pilot; }),
@@ -38,10 +39,12 @@ const std::vector<Row>& rows() {
       row<double>("vehicle", "drag_Npmps", 0, 5, [](D& d) -> double& { return d.config.vehicle.drag_Npmps; }),
       row<double>("imu", "gyro_noise_radps", 0, 1, [](D& d) -> double& { return d.config.imu.gyro_noise_radps; }),
       row<double>("imu", "gyro_bias_radps", 0, 1, [](D& d) -> double& { return d.config.imu.gyro_bias_radps; }),
-      row<double>("imu", "gyro_walk_radps_sqrts", 0, 0.1, [](D& d) -> double& { return d.config.imu.gyro_walk_radps_sqrts; }),
+      row<double>("imu", "gyro_walk_radps_sqrts", 0, 0.1,
+          [](D& d) -> double& { return d.config.imu.gyro_walk_radps_sqrts; }),
       row<double>("imu", "accel_noise_mps2", 0, 10, [](D& d) -> double& { return d.config.imu.accel_noise_mps2; }),
       row<double>("imu", "accel_bias_mps2", 0, 2, [](D& d) -> double& { return d.config.imu.accel_bias_mps2; }),
-      row<double>("imu", "accel_walk_mps2_sqrts", 0, 1, [](D& d) -> double& { return d.config.imu.accel_walk_mps2_sqrts; }),
+      row<double>("imu", "accel_walk_mps2_sqrts", 0, 1,
+          [](D& d) -> double& { return d.config.imu.accel_walk_mps2_sqrts; }),
       row<double>("imu", "mag_noise_gauss", 0, 1, [](D& d) -> double& { return d.config.imu.mag_noise_gauss; }),
       row<double>("imu", "pressure_noise_hpa", 0, 5, [](D& d) -> double& { return d.config.imu.pressure_noise_hpa; }),
       row<double>("camera", "rate_hz", 1, 120, [](D& d) -> double& { return d.config.camera_rate_hz; }),
@@ -61,7 +64,8 @@ const std::vector<Row>& rows() {
       row<float>("camera", "right_m", -0.5, 0.5, [](D& d) -> float& { return d.config.camera.position_body_m.y(); }),
       row<float>("camera", "below_m", -0.5, 0.15, [](D& d) -> float& { return d.config.camera.position_body_m.z(); }),
       row<bool>("sensor", "noise", 0, 1, [](D& d) -> bool& { return d.config.sensor.noise; }),
-      row<float>("sensor", "depth_noise_steps", 0, 20, [](D& d) -> float& { return d.config.sensor.depth_noise_steps; }),
+      row<float>("sensor", "depth_noise_steps", 0, 20,
+          [](D& d) -> float& { return d.config.sensor.depth_noise_steps; }),
       row<float>("sensor", "min_range_m", 0.05, 5, [](D& d) -> float& { return d.config.sensor.min_range_m; }),
       row<float>("sensor", "max_range_m", 0.5, 10, [](D& d) -> float& { return d.config.sensor.max_range_m; }),
       row<float>("sensor", "dropout", 0, 1, [](D& d) -> float& { return d.config.sensor.dropout; }),
@@ -71,6 +75,7 @@ const std::vector<Row>& rows() {
       row<double>("world", "floor_edges_per_m", 0.05, 20, [](D& d) -> double& { return d.config.floor_edges_per_m; }),
       row<int>("world", "cartons", 0, 40, [](D& d) -> int& { return d.config.cartons; }),
   };
+  // clang-format on
   return kRows;
 }
 
@@ -101,8 +106,10 @@ void apply(Draft& draft, const std::string& section, const std::string& key, con
 
 void check(const SimConfig& config, const std::string& name) {
   const Intrinsics& k = config.camera.intrinsics;
-  if (k.width_px % 4 != 0 || k.height_px % 4 != 0) fail(name, "camera.width_px and camera.height_px must be multiples of 4");
-  if (config.sensor.min_range_m >= config.sensor.max_range_m) fail(name, "sensor.min_range_m must be below sensor.max_range_m");
+  if (k.width_px % 4 != 0 || k.height_px % 4 != 0)
+    fail(name, "camera.width_px and camera.height_px must be multiples of 4");
+  if (config.sensor.min_range_m >= config.sensor.max_range_m)
+    fail(name, "sensor.min_range_m must be below sensor.max_range_m");
 }
 
 }  // namespace

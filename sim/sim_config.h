@@ -1,5 +1,5 @@
-// Every setting of the simulator, with its default. config/sim.toml documents the same list; a key that is not in it, or
-// a value outside its range, is an error that names the key.
+// Every setting of the simulator, with its default. config/sim.toml documents the same list; a key that is not in it,
+// or a value outside its range, is an error that names the key.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,7 @@ struct SimConfig {
   std::uint32_t seed = 1;
   bool safety_pilot = true;
   double clock_offset_s = 1000.25;  ///< autopilot clock minus the simulator's, 0 ... 1e6
-  double camera_rate_hz = 30;     ///< 1 ... 120
+  double camera_rate_hz = 30;       ///< 1 ... 120
   CameraGeometry camera;
   VehicleParams vehicle;
   ImuParams imu;

@@ -1,5 +1,5 @@
-// wasp-sim: hardware that is not there. A flight controller on a pseudo-terminal and a Kinect in shared memory, driven by
-// a simulated quadrotor in a simulated laboratory. The flying process cannot tell it from the vehicle.
+// wasp-sim: hardware that is not there. A flight controller on a pseudo-terminal and a Kinect in shared memory, driven
+// by a simulated quadrotor in a simulated laboratory. The flying process cannot tell it from the vehicle.
 #include <CLI/CLI.hpp>
 #include <atomic>
 #include <csignal>
@@ -29,16 +29,21 @@ struct Options {
 };
 
 void declare(CLI::App& app, Options& o) {
-  app.add_option("--instance", o.instance, "name of the shared memory regions: wasp.NAME.camera, wasp.NAME.truth")->capture_default_str();
+  app.add_option("--instance", o.instance, "name of the shared memory regions: wasp.NAME.camera, wasp.NAME.truth")
+      ->capture_default_str();
   app.add_option("--tty-link", o.tty_link, "symbolic link to make to the autopilot's serial line")->required();
   app.add_option("--config", o.config_path, "TOML file; see share/wasp/config/sim.toml for every key");
   app.add_option("--seed", o.seed, "seed of world, sensors and vehicle (default: run.seed of the configuration)");
-  app.add_option("--rate-hz", o.rate_hz, "camera rate (default: camera.rate_hz of the configuration)")->check(CLI::Range(1.0, 120.0));
+  app.add_option("--rate-hz", o.rate_hz, "camera rate (default: camera.rate_hz of the configuration)")
+      ->check(CLI::Range(1.0, 120.0));
   app.add_flag("--no-camera", o.no_camera, "autopilot and truth only");
-  app.add_flag("--no-safety-pilot", o.no_safety_pilot,
-               "do not hold the vehicle over its place: without this flag a small slow trim (at most 3 degrees, from the "
-               "true position) is added to roll and pitch, as the supervising pilot of the thesis' flights would");
-  app.add_option("--seconds", o.seconds, "end after this time; 0: run until SIGINT or SIGTERM")->check(CLI::NonNegativeNumber)->capture_default_str();
+  app.add_flag(
+      "--no-safety-pilot", o.no_safety_pilot,
+      "do not hold the vehicle over its place: without this flag a small slow trim (at most 3 degrees, from the "
+      "true position) is added to roll and pitch, as the supervising pilot of the thesis' flights would");
+  app.add_option("--seconds", o.seconds, "end after this time; 0: run until SIGINT or SIGTERM")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
 }
 
 SimConfig settings(const Options& o) {
@@ -76,7 +81,8 @@ void wait_for_end(const sigset_t& signals, double seconds) {
 /// Regions that vanish with the simulator.
 struct Owned {
   shm::Region region;
-  Owned(const std::string& name, std::span<const shm::TopicSpec> topics) : region(shm::Region::create(name, topics, "simulated")) {}
+  Owned(const std::string& name, std::span<const shm::TopicSpec> topics)
+      : region(shm::Region::create(name, topics, "simulated")) {}
   ~Owned() { shm::Region::remove(region.name()); }
   Owned(const Owned&) = delete;
   Owned& operator=(const Owned&) = delete;
@@ -88,7 +94,8 @@ void run(const Options& options, const sigset_t& signals) {
   const shm::TopicSpec truth_topic{shm::kTruth, "Truth", shm::TopicKind::kRing, shm::kTruthSlots, sizeof(Truth)};
   const Owned truth(shm::truth_region(options.instance), {&truth_topic, 1});
   std::optional<Owned> frames;
-  if (camera) frames.emplace(shm::camera_region(options.instance), CameraLoop::topics(camera->width_px(), camera->height_px()));
+  if (camera)
+    frames.emplace(shm::camera_region(options.instance), CameraLoop::topics(camera->width_px(), camera->height_px()));
   Pty pty(options.tty_link);
 
   const TimeNs start_ns = rt::now() + 10 * kMillisecond;
@@ -102,7 +109,8 @@ void run(const Options& options, const sigset_t& signals) {
   rt::Thread camera_thread;
   if (camera_loop)
     camera_thread = rt::Thread({.name = "camera", .core = rt::nearest_usable_core(0)}, [&] { camera_loop->run(stop); });
-  std::printf("wasp-sim: instance %s, serial line %s -> %s\n", options.instance.c_str(), options.tty_link.c_str(), pty.slave_path().c_str());
+  std::printf("wasp-sim: instance %s, serial line %s -> %s\n", options.instance.c_str(), options.tty_link.c_str(),
+              pty.slave_path().c_str());
   std::fflush(stdout);
   wait_for_end(signals, options.seconds);
   stop.store(true);
@@ -112,7 +120,8 @@ void run(const Options& options, const sigset_t& signals) {
   std::printf("wasp-sim: %llu late ticks", static_cast<unsigned long long>(vehicle_loop.late_ticks()));
   if (camera_loop)
     std::printf(", %llu frames, %llu skipped, rendering p50 %.2f ms, max %.2f ms",
-                static_cast<unsigned long long>(camera_loop->frames()), static_cast<unsigned long long>(camera_loop->skipped()),
+                static_cast<unsigned long long>(camera_loop->frames()),
+                static_cast<unsigned long long>(camera_loop->skipped()),
                 static_cast<double>(camera_loop->render_time().quantile_ns(0.5)) * 1e-6,
                 static_cast<double>(camera_loop->render_time().max_ns()) * 1e-6);
   std::printf("\n");
@@ -121,7 +130,8 @@ void run(const Options& options, const sigset_t& signals) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app{"wasp-sim: a simulated quadrotor with autopilot (MAVLink on a pseudo-terminal) and Kinect (shared memory)"};
+  CLI::App app{
+      "wasp-sim: a simulated quadrotor with autopilot (MAVLink on a pseudo-terminal) and Kinect (shared memory)"};
   Options options;
   declare(app, options);
   CLI11_PARSE(app, argc, argv);

@@ -1,6 +1,6 @@
 // The whole simulated vehicle on virtual time: physics at 1 kHz, sensors, flight controller and serial link at 200 Hz.
-// It reads no clock: `advance_to` runs it as far as it is told, so a lockstep test and the real-time program use the same
-// class, and the same seed and bytes give the same flight.
+// It reads no clock: `advance_to` runs it as far as it is told, so a lockstep test and the real-time program use the
+// same class, and the same seed and bytes give the same flight.
 #pragma once
 
 #include <array>

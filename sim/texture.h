@@ -1,5 +1,5 @@
-// A repeating grey texture with its mipmaps: each level halves the last by the mean of four, a sample is bilinear in the
-// level whose texel is about as wide as the pixel's footprint.
+// A repeating grey texture with its mipmaps: each level halves the last by the mean of four, a sample is bilinear in
+// the level whose texel is about as wide as the pixel's footprint.
 #pragma once
 
 #include <cstdint>

@@ -34,15 +34,16 @@ void Vehicle::step(const std::array<double, 4>& wanted_radps) {
   for (std::size_t i = 0; i < 4; ++i) rotors_[i].step(wanted_radps[i], kPhysicsStep_s);
   Wrench wrench = rotor_wrench();
   wrench.force_ned_N -= params_.drag_Npmps * state_.velocity_ned_mps;
-  const ContactForce contact = contact_.at(state_.position_ned_m, state_.velocity_ned_mps, state_.q_ned_body,
-                                           state_.rate_body_radps);
+  const ContactForce contact =
+      contact_.at(state_.position_ned_m, state_.velocity_ned_mps, state_.q_ned_body, state_.rate_body_radps);
   state_.on_ground = contact.touching;
   wrench.force_ned_N += contact.force_ned_N;
   wrench.torque_body_Nm += contact.torque_body_Nm;
   integrate(wrench);
 }
 
-/// (B.3) in FRD: front thrust pitches up, left thrust rolls right; propeller drag and spin-up turn the body the other way.
+/// (B.3) in FRD: front thrust pitches up, left thrust rolls right; propeller drag and spin-up turn the body the other
+/// way.
 Vehicle::Wrench Vehicle::rotor_wrench() const {
   double collective_N = 0, yaw_Nm = 0, momentum = 0;
   for (std::size_t i = 0; i < 4; ++i) {

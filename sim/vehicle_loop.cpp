@@ -5,7 +5,8 @@
 
 namespace wasp::sim {
 
-VehicleLoop::VehicleLoop(const SimConfig& config, TimeNs start_ns, Pty& pty, const shm::Region& truth_region, PoseQueue& poses)
+VehicleLoop::VehicleLoop(const SimConfig& config, TimeNs start_ns, Pty& pty, const shm::Region& truth_region,
+                         PoseQueue& poses)
     : simulator_(config, start_ns),
       next_ns_(start_ns + kControlPeriod_ns),
       pty_(pty),

@@ -46,13 +46,13 @@ constexpr InertiaRow total_inertia() {
 
 /// Motor and propeller. Speed from voltage is (B.5); thrust b w^2, drag torque d w^2.
 ///
-/// The thesis' figures for b and d did not survive. Full speed follows from 5.6 N and the static thrust coefficient of a
-/// small slow-flyer propeller, d from its power coefficient: C_T = 0.1099, C_P = 0.0402, UIUC Propeller Data Site
-/// (Brandt, Selig et al., vol. 1), GWS 9x5 at 6400 rpm as adopted in AirSim's RotorParams; the nearest published pair to
-/// the 10x4.5 of the vehicle that we could check. R is the resistance that makes 11.4 V just hold full speed.
+/// The thesis' figures for b and d did not survive. Full speed follows from 5.6 N and the static thrust coefficient of
+/// a small slow-flyer propeller, d from its power coefficient: C_T = 0.1099, C_P = 0.0402, UIUC Propeller Data Site
+/// (Brandt, Selig et al., vol. 1), GWS 9x5 at 6400 rpm as adopted in AirSim's RotorParams; the nearest published pair
+/// to the 10x4.5 of the vehicle that we could check. R is the resistance that makes 11.4 V just hold full speed.
 struct RotorParams {
   double diameter_m = 0.254;
-  double max_thrust_N = 5.6;     ///< thesis A.2.3
+  double max_thrust_N = 5.6;  ///< thesis A.2.3
   double thrust_coefficient = 0.1099;
   double power_coefficient = 0.0402;
   double air_density_kgpm3 = 1.225;
@@ -60,7 +60,7 @@ struct RotorParams {
   double motor_constant = 60.0 / (2.0 * std::numbers::pi * 1000.0);  ///< K_m: 1000 rpm/V, in V s and N m/A
   /// B.2.1: a flat plate of 10 g, 0.254 m x 0.025 m, and a bell of 30 g, radius 14 mm (typical parts) [kg m^2].
   double inertia_kgm2 = 0.010 * (0.254 * 0.254 + 0.025 * 0.025) / 12 + 0.030 * 0.014 * 0.014 / 2;
-  double regulator_s = 0.05;     ///< closed-loop time constant of the speed controller while it does not saturate
+  double regulator_s = 0.05;  ///< closed-loop time constant of the speed controller while it does not saturate
 
   [[nodiscard]] double max_speed_radps() const {
     const double d2 = diameter_m * diameter_m;
@@ -80,11 +80,11 @@ struct RotorParams {
 struct VehicleParams {
   double mass_kg = 1.925;
   InertiaRow inertia_kgm2 = total_inertia();
-  double arm_m = 0.185;          ///< l, centre to rotor
+  double arm_m = 0.185;  ///< l, centre to rotor
   double gravity_mps2 = 9.81;
-  double drag_Npmps = 0.25;      ///< linear aerodynamic drag of frame and rotor discs (our estimate)
-  double leg_m = 0.20;           ///< centre of mass above the floor when standing
-  double foot_spread_m = 0.13;   ///< feet at (+-, +-) this from the centre
+  double drag_Npmps = 0.25;     ///< linear aerodynamic drag of frame and rotor discs (our estimate)
+  double leg_m = 0.20;          ///< centre of mass above the floor when standing
+  double foot_spread_m = 0.13;  ///< feet at (+-, +-) this from the centre
   RotorParams rotor;
 
   [[nodiscard]] double max_collective_N() const { return 4 * rotor.max_thrust_N; }

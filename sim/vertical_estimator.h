@@ -1,5 +1,5 @@
-// Height and climb rate for the descent without a companion: a third-order complementary filter of vertical acceleration
-// and barometric height, all three poles at 0.5 rad/s, so that an accelerometer bias is found and removed.
+// Height and climb rate for the descent without a companion: a third-order complementary filter of vertical
+// acceleration and barometric height, all three poles at 0.5 rad/s, so that an accelerometer bias is found and removed.
 #pragma once
 
 #include "types/frames.h"

@@ -40,12 +40,12 @@ void World::add_box(const Vec3& base, const Vec3& size_m, float yaw_rad, const M
   const Vec3 y = Vec3(-std::sin(yaw_rad), std::cos(yaw_rad), 0) * size_m.y();
   const Vec3 z(0, 0, -size_m.z());
   const Vec3 near_left = base - x / 2 - y / 2;
-  add_quad(near_left + z, y, x, m);          // top
-  add_quad(near_left, x, y, m);              // underside
-  add_quad(near_left + z, -z, y, m);         // back (towards -x)
-  add_quad(near_left + x + z, y, -z, m);     // front (towards +x)
-  add_quad(near_left + z, x, -z, m);         // left
-  add_quad(near_left + y + z, -z, x, m);     // right
+  add_quad(near_left + z, y, x, m);       // top
+  add_quad(near_left, x, y, m);           // underside
+  add_quad(near_left + z, -z, y, m);      // back (towards -x)
+  add_quad(near_left + x + z, y, -z, m);  // front (towards +x)
+  add_quad(near_left + z, x, -z, m);      // left
+  add_quad(near_left + y + z, -z, x, m);  // right
 }
 
 }  // namespace wasp::sim

@@ -54,6 +54,22 @@ std::set<std::string> height_behaviours(const ReportData& data) {
   return found;
 }
 
+/// Truth at time x, linear between samples; NaN outside them and in gaps over 0.1 s.
+double at_time(const Series& truth, double x) {
+  const auto after = std::lower_bound(truth.x.begin(), truth.x.end(), x);
+  if (after == truth.x.begin() || after == truth.x.end()) return kNan;
+  const auto i = static_cast<std::size_t>(after - truth.x.begin());
+  const double gap = truth.x[i] - truth.x[i - 1];
+  if (gap > 0.1 || gap <= 0) return kNan;
+  const double share = (x - truth.x[i - 1]) / gap;
+  return truth.y[i - 1] + share * (truth.y[i] - truth.y[i - 1]);
+}
+
+Series minus_truth(Series series, const Series& truth) {
+  for (std::size_t i = 0; i < series.size(); ++i) series.y[i] -= at_time(truth, series.x[i]);
+  return series;
+}
+
 void add_phases(Plot& plot, const ReportData& data) {
   if (!data.run.contains("phases") || !data.run["phases"].is_array()) return;
   for (const auto& p : data.run["phases"]) {
@@ -104,6 +120,18 @@ std::string altitude_figure(const ReportData& data) {
   add_curve(plot, "control's estimate", {"c4", "thin"}, column_series(data, data.commands, "due_at_ns", "height_m"), kWideSlices);
   add_curve(plot, "truth", {"ink", "thick"}, column_series(data, data.truth, "exposed_at_ns", "height_m"), kWideSlices);
   add_curve(plot, "setpoint", {"c3", "thick dashed"}, column_series(data, data.commands, "due_at_ns", "height_setpoint_m"), kWideSlices);
+  return svg_or_nothing(plot);
+}
+
+std::string height_error_figure(const ReportData& data) {
+  Plot plot = narrow_plot("Height minus truth over time", "time [s]", "height minus truth [m]");
+  plot.least_y_span = 0.04;
+  const Series truth = column_series(data, data.truth, "exposed_at_ns", "height_m");
+  int colour = 0;
+  for (const auto& name : height_behaviours(data))
+    add_curve(plot, name, {fmt::format("c{}", colour++ % 6), "thin"}, minus_truth(cue_heights(data, name), truth), kNarrowSlices);
+  const Series estimate = column_series(data, data.commands, "due_at_ns", "height_m");
+  add_curve(plot, "control's estimate", {"c4", "thin"}, minus_truth(estimate, truth), kNarrowSlices);
   return svg_or_nothing(plot);
 }
 

@@ -9,6 +9,8 @@ namespace wasp::tools {
 
 /// Truth, setpoint, control's estimate and every behaviour that speaks of height, over time; mission phases shaded.
 std::string altitude_figure(const ReportData& data);
+/// How far each estimate of height is from truth at the same instant: the behaviours' cues and control's own.
+std::string height_error_figure(const ReportData& data);
 /// Truth from above: east to the right, north up, equal scales.
 std::string path_figure(const ReportData& data);
 /// Roll and pitch as commanded and as the autopilot estimates them.

@@ -82,7 +82,7 @@ void result_row(const json& r, Out out) {
   fmt::format_to(out, "<tr><td>{}</td><td class='n'>{} {}</td><td class='n'>{}</td><td class='state {}'>{}</td></tr>\n",
                  escape_html(text_at(r, "name")), escape_html(text_at(r, "value")), escape_html(text_at(r, "unit")),
                  escape_html(text_at(r, "bar")), !met ? "soft" : *met ? "good" : "bad",
-                 !met ? "not judged" : *met ? "&#10003; met" : "&#10007; missed");
+                 !met ? "no bar" : *met ? "&#10003; met" : "&#10007; missed");
 }
 
 void results(const ReportData& data, Out out) {
@@ -106,6 +106,7 @@ void figures(const ReportData& data, Out out) {
   fmt::format_to(out, "<h2>The flight</h2>\n<div class='wide'>");
   figure("Altitude", altitude_figure(data), "No heights were recorded.", out);
   fmt::format_to(out, "</div>\n<div class='pair' style='margin-top:16px'>");
+  figure("Error of the height estimates", height_error_figure(data), "Heights or truth were not recorded.", out);
   figure("Ground track (truth, from above)", path_figure(data), "No truth was recorded.", out);
   figure("Roll and pitch", attitude_figure(data), "No attitude was recorded.", out);
   figure("Thrust", thrust_figure(data), "No commands were recorded.", out);

@@ -67,8 +67,15 @@ void draw_spans(const Plot& plot, const Frame& f, Out out) {
     if (b <= a) continue;
     fmt::format_to(out, "<rect class='span{}' x='{:.1f}' y='{:.1f}' width='{:.1f}' height='{:.1f}'><title>{}</title></rect>",
                    i % 2, a, f.y0, b - a, f.y1 - f.y0, escape_html(s.name));
+  }
+}
+
+/// Names of the spans that have room for them, over the grid.
+void draw_span_names(const Plot& plot, const Frame& f, Out out) {
+  for (const Span& s : plot.spans) {
+    const double a = std::clamp(f.px(s.from), f.x0, f.x1), b = std::clamp(f.px(s.to), f.x0, f.x1);
     if (text_width(s.name) + 8 < b - a)
-      fmt::format_to(out, "<text class='faint' x='{:.1f}' y='{:.1f}'>{}</text>", a + 4, f.y0 + 13, escape_html(s.name));
+      fmt::format_to(out, "<text class='faint halo' x='{:.1f}' y='{:.1f}'>{}</text>", a + 4, f.y0 + 13, escape_html(s.name));
   }
 }
 
@@ -151,6 +158,7 @@ std::string Plot::svg() const {
   draw_spans(*this, f, out);
   draw_axes(*this, f, out);
   for (const auto& c : curves) draw_curve(c, f, out);
+  draw_span_names(*this, f, out);
   draw_marks(*this, f, out);
   draw_legend(*this, out);
   text += "</svg>";

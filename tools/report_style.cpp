@@ -20,13 +20,14 @@ p{margin:6px 0}.soft{color:var(--soft)}.small{font-size:.86rem}
 .scroll{overflow-x:auto}
 table{border-collapse:collapse;width:100%;font-size:.9rem;font-variant-numeric:tabular-nums}
 th{font-weight:600;text-align:left;color:var(--soft);white-space:nowrap}td,th{padding:5px 10px;border-bottom:1px solid var(--line)}
-tr:last-child td{border-bottom:0}td.n,th.n{text-align:right;white-space:nowrap}td.state{white-space:nowrap;font-weight:600}
+tr:last-child td{border-bottom:0}td.n,th.n{text-align:right;white-space:nowrap}td.state{white-space:nowrap;font-weight:600}td.state.soft{font-weight:400}
 dl{display:grid;grid-template-columns:max-content 1fr;gap:3px 16px;margin:0;font-size:.92rem}dt{color:var(--soft)}dd{margin:0;overflow-wrap:anywhere}
 .pair{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(440px,100%),1fr));gap:16px}
 svg{display:block;width:100%;height:auto}.wide svg{min-width:760px}.pair svg{min-width:400px}
 svg text{font:11.5px system-ui,-apple-system,"Segoe UI",Roboto,"DejaVu Sans",sans-serif;fill:var(--ink)}
 svg .mid{text-anchor:middle}svg .end{text-anchor:end}svg .faint,svg .name{fill:var(--soft)}
 .grid{stroke:var(--line);stroke-width:1;fill:none}.axis{stroke:var(--soft);stroke-width:1;fill:none}
+svg .halo{paint-order:stroke;stroke:var(--card);stroke-width:3;stroke-opacity:.75}
 .span0{fill:var(--span)}.span1{fill:transparent}
 .line{fill:none;stroke-linejoin:round}.thin{stroke-width:1.2}.medium{stroke-width:1.6}.thick{stroke-width:2.2}.soft.line{stroke-opacity:.6}.dashed{stroke-dasharray:7 4}
 .c0{stroke:var(--c0)}.c1{stroke:var(--c1)}.c2{stroke:var(--c2)}.c3{stroke:var(--c3)}.c4{stroke:var(--c4)}.c5{stroke:var(--c5)}.ink{stroke:var(--ink)}

@@ -157,12 +157,15 @@ TEST(Thread, StackIsPrefaultedBeforeTheBodyRuns) {
   Thread({.name = "deep"}, [&] {
     rusage before{}, after{};
     getrusage(RUSAGE_THREAD, &before);
-    volatile char frame[128 * 1024];
+    volatile char frame[384 * 1024];
     for (std::size_t i = 0; i < sizeof frame; i += 4096) frame[i] = 1;
     getrusage(RUSAGE_THREAD, &after);
     faults = after.ru_minflt - before.ru_minflt;
   }).join();
-  EXPECT_LE(faults, 2);  // 32 pages touched
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "the sanitizers' shadow memory faults too";
+#endif
+  EXPECT_LE(faults, 2);  // 96 pages touched, of a stack of 512 KiB
 }
 
 TEST(Thread, MovesAndJoins) {

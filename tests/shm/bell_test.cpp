@@ -128,6 +128,36 @@ TEST_F(BellTest, SleeperOutlivesTheWriterAndIsWokenByItsSuccessor) {
   Region::remove(name);
 }
 
+TEST_F(BellTest, AnnouncedSleeperGetsTheMessageAndAnEmptyAnnouncementDoesNoHarm) {
+  const pid_t reader = start_reader(50);
+  for (int i = 0; i < 50; ++i) {
+    ASSERT_TRUE(test::eventually([&] { return taken_.load() == writer_.published(); }) && sleepers_reach(1)) << i;
+    std::byte* loan = writer_.loan();
+    writer_.announce();
+    if (i % 5 == 0) {  // nothing follows: the reader goes back to sleep
+      ASSERT_TRUE(sleepers_reach(1));
+    }
+    fill(loan, writer_.published() + 1);
+    writer_.publish(0);
+  }
+  EXPECT_EQ(test::wait_for(reader), 0);
+}
+
+TEST_F(BellTest, TimeOutIsHonouredAfterAnEmptyAnnouncement) {
+  const pid_t reader = test::start_child([this] {
+    const Region region = Region::attach_with_bells(name_);
+    RingReader ring(region, "data");
+    const TimeNs deadline = rt::now() + 300 * kMillisecond;
+    return !ring.wait(deadline) && rt::now() >= deadline ? 0 : 1;
+  });
+  siginfo_t ended{};
+  while (waitid(P_PID, static_cast<id_t>(reader), &ended, WEXITED | WNOHANG | WNOWAIT) == 0 && ended.si_pid != reader) {
+    writer_.announce();
+    rt::sleep_until(rt::now() + kMillisecond);
+  }
+  EXPECT_EQ(test::wait_for(reader), 0);
+}
+
 TEST_F(BellTest, ObserverWithoutBellsIsNeverPutToSleep) {
   const Region observer = Region::attach(name_);
   RingReader reader(observer, "data");

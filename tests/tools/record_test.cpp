@@ -239,6 +239,29 @@ TEST_F(Record, FollowsAFlightThatEndsAndStartsAgain) {
   EXPECT_EQ(rows(out_ / "log/imu.csv"), 20u);
 }
 
+TEST_F(Record, WhatAnEarlierFlightLeftIsNotRecorded) {
+  const std::string instance = test::unique_instance("left");
+  if (const pid_t child = fork(); child == 0) {  // a flight that finished and left its regions behind
+    auto* flight = new FakeFlight(instance);
+    for (std::uint32_t n = 0; n < 5; ++n) flight->write_imu(1 + n, n);
+    flight->run->finished = 1;
+    _exit(0);
+  } else {
+    waitpid(child, nullptr, 0);
+  }
+  Program recorder(arguments(instance, out_));
+  ASSERT_TRUE(eventually([&] { return fs::exists(out_ / "log/truth.csv"); }));
+  std::this_thread::sleep_for(std::chrono::milliseconds(500));  // longer than its grace after a finished flight
+  FakeFlight flight(instance);
+  for (std::uint32_t n = 0; n < 3; ++n) flight.write_imu(100 + n, n);
+  ASSERT_TRUE(eventually([&] { return rows(out_ / "log/imu.csv") == 3; }));
+  flight.run->finished = 1;
+  ASSERT_EQ(recorder.wait(), 0);
+  EXPECT_EQ(CsvTable::read(out_ / "log/imu.csv")->integers("exposed_at_ns")[0], 100);
+  EXPECT_EQ(topic(out_, "imu").at("before_attach"), 5);
+  EXPECT_EQ(topic(out_, "imu").at("lost"), 0);
+}
+
 TEST_F(Record, RefusesAFolderThatHoldsARecording) {
   FakeFlight flight(test::unique_instance("refuse"));
   flight.run->finished = 1;

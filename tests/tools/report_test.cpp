@@ -102,7 +102,7 @@ TEST(Report, HoldsFiguresTablesAndNames) {
   ASSERT_EQ(code, 0) << text;
   const std::string page = test::read_text(folder.path / "report.html");
   EXPECT_LT(page.size(), 2'000'000u);
-  EXPECT_EQ(count_of(page, "<svg"), 4u + 8u);  // altitude, track, attitude, thrust; eight stages
+  EXPECT_EQ(count_of(page, "<svg"), 5u + 8u);  // altitude, error, track, attitude, thrust; eight stages
   EXPECT_EQ(count_of(page, "<svg"), count_of(page, "</svg>"));
   EXPECT_EQ(count_of(page, ">budget</text>"), 6u);
   EXPECT_EQ(count_of(page, "nan"), 0u);

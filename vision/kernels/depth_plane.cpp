@@ -10,8 +10,8 @@ namespace {
 
 constexpr int kPreviewCount = 256;
 constexpr int kGravityDraws = 32;  // one-point candidates with the normal straight up
-/// Three-point draws, and how many of them at most reach the preview. A warm search still draws enough to leave a
-/// plane it should not have settled on within a few frames.
+/// Three-point draws, and how many of them at most reach the preview. Last frame's plane spares most of them while it
+/// keeps its support; the rest suffice to leave a plane it should not have settled on within a few frames.
 struct Draws {
   int tried, scored;
 };
@@ -21,6 +21,7 @@ constexpr int kPolishPasses = 4;
 constexpr std::array kReachCells = {4, 7, 10, 16};  // of a three-point draw about its first point, in turn
 constexpr int kBelowPenalty = 4;               // one sample below outweighs four on the plane
 constexpr float kSigmas = 3.f;
+constexpr float kWarmSupport = 0.7f;  // of last frame's support that last frame's plane must keep
 constexpr float kFirstFit = 2.f;  // tolerance of the first fit, in units of the final one
 constexpr float kMinTripleArea = 0.004f;  // of the ray square; 640x480 at f 525 spans 1.1
 constexpr float kMinHeight_m = 0.03f, kMaxHeight_m = 20.f;
@@ -86,9 +87,13 @@ void keep(Search& search, const Candidate& candidate) noexcept {
   if (candidate.score > worst->score) *worst = candidate;
 }
 
+int preview_score(const Search& search, const InversePlane& plane) noexcept {
+  return score(count_support(search.frame.preview(), plane, search.tolerance));
+}
+
 bool consider(Search& search, const InversePlane& plane) noexcept {
   if (!plausible(search, plane)) return false;
-  keep(search, {plane, score(count_support(search.frame.preview(), plane, search.tolerance))});
+  keep(search, {plane, preview_score(search, plane)});
   return true;
 }
 
@@ -133,8 +138,15 @@ bool consider_triple(Search& search, int reach, PseudoRandom& random) noexcept {
          plane_through(search.frame.all(), {first, second, third}, kMinTripleArea, plane) && consider(search, plane);
 }
 
+/// Whether last frame's plane is still there (and not just still conceivable, as after a cut).
+bool still_there(const Search& search, const DepthPlaneState& state) noexcept {
+  const int seen = std::min(search.frame.samples.count, kPreviewCount);
+  return static_cast<float>(preview_score(search, state.last)) >=
+         kWarmSupport * state.last_share * static_cast<float>(seen);
+}
+
 void draw_candidates(Search& search, DepthPlaneState& state) noexcept {
-  const bool warm = state.warm && consider(search, state.last);
+  const bool warm = state.warm && consider(search, state.last) && still_there(search, state);
   if (search.prior.measured)
     for (int i = 0; i < kGravityDraws; ++i) consider_gravity(search, state.random);
   const Draws draws = warm ? kWarmDraws : kColdDraws;
@@ -221,6 +233,7 @@ PlaneEstimate estimate_floor(const DepthPlaneParams& params, const Intrinsics& i
       best.score == Candidate{}.score ? PlaneEstimate{} : polish(params, search, best.plane);
   state.warm = estimate.valid;
   if (estimate.valid) {
+    state.last_share = estimate.inlier_share;
     const Vec3 gradient = -estimate.normal_cam / estimate.height_m;
     state.last = {gradient.x(), gradient.y(), gradient.z()};
   }

@@ -52,6 +52,7 @@ struct DepthPlaneState {
   PseudoRandom random;
   bool warm = false;
   InversePlane last;
+  float last_share = 0;  ///< inlier share of the last frame
   SampleTable table;
 };
 

@@ -1,11 +1,11 @@
-// Sums run in four independent lanes, so that the compiler may vectorise them without changing the result, and the
-// result does not depend on the compiler's choice.
+// Sums run in four lanes written out as vectors: fast at any optimisation level, and the same result whatever the
+// compiler chooses, because the order of additions is fixed here.
 #include "vision/kernels/plane_fit.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 namespace wasp::vision {
 namespace {
@@ -20,43 +20,57 @@ struct Band {
       : sensor(t.sensor_per_m), slope(t.flatness_m * plane.gradient().norm()) {}
 };
 
-using Lane = std::array<float, kLanes>;
+/// Four floats at once: a vector register wherever there is one (GCC and clang vector extension).
+using Lane [[gnu::vector_size(16)]] = float;
 
-/// Moments of the inliers about the origin: n, x, y, w, xx, xy, yy, xw, yw, ww, and the perpendicular residuals' sum.
-struct Moments {
-  Lane n{}, x{}, y{}, w{}, xx{}, xy{}, yy{}, xw{}, yw{}, ee{}, dd{};
-};
+Lane load(const float* p) noexcept {
+  Lane lane;
+  std::memcpy(&lane, p, sizeof lane);
+  return lane;
+}
 
-double total(const Lane& lane) noexcept {
-  const auto at = [&lane](std::size_t l) { return static_cast<double>(lane[l]); };
+double total(Lane lane) noexcept {
+  const auto at = [&lane](int l) { return static_cast<double>(lane[l]); };
   return (at(0) + at(1)) + (at(2) + at(3));
 }
 
-/// Residuals are taken against `p` (w itself never enters squared), so float sums keep their precision.
-void add(Moments& m, std::size_t l, float x, float y, float w, const InversePlane& p, const Band& band) noexcept {
-  const float r = w - (p.a * x + p.b * y + p.c);
-  const float on = std::abs(r) < band.sensor + band.slope * w ? 1.f : 0.f;
-  const float ox = on * x, oy = on * y, orr = on * r, d = r / w;
-  m.n[l] += on;
-  m.x[l] += ox;
-  m.y[l] += oy;
-  m.w[l] += orr;
-  m.xx[l] += ox * x;
-  m.xy[l] += ox * y;
-  m.yy[l] += oy * y;
-  m.xw[l] += ox * r;
-  m.yw[l] += oy * r;
-  m.ee[l] += orr * r;
-  m.dd[l] += on * d * d;
-}
+/// Moments of the inliers and their residuals against the start plane (w itself never enters squared, so float sums
+/// keep their precision): n, x, y, r, xx, xy, yy, xr, yr, rr, and the squares of r / w for perpendicular distances.
+struct Moments {
+  Lane n{}, x{}, y{}, r{}, xx{}, xy{}, yy{}, xr{}, yr{}, rr{}, dd{};
+
+  void add(Lane px, Lane py, Lane pw, const InversePlane& p, const Band& band) noexcept {
+    const Lane pr = pw - (p.a * px + p.b * py + p.c), tolerance = band.sensor + band.slope * pw;
+    const Lane on = ((pr < tolerance) & (pr > -tolerance)) ? Lane{1.f, 1.f, 1.f, 1.f} : Lane{};
+    const Lane ox = on * px, oy = on * py, residual = on * pr, distance = residual / pw;
+    n += on;
+    x += ox;
+    y += oy;
+    r += residual;
+    xx += ox * px;
+    xy += ox * py;
+    yy += oy * py;
+    xr += ox * pr;
+    yr += oy * pr;
+    rr += residual * pr;
+    dd += distance * distance;
+  }
+};
+
+/// Points that fill up the last lane: far above any plane, so never counted.
+constexpr float kPadding_per_m = 1e6f;
 
 Moments moments(const InverseDepths& points, const InversePlane& p, const Band& band) noexcept {
   Moments m;
   const std::size_t n = points.w.size(), whole = n - n % kLanes;
   const float *x = points.x.data(), *y = points.y.data(), *w = points.w.data();
-  for (std::size_t i = 0; i < whole; i += kLanes)
-    for (std::size_t l = 0; l < kLanes; ++l) add(m, l, x[i + l], y[i + l], w[i + l], p, band);
-  for (std::size_t i = whole; i < n; ++i) add(m, i - whole, x[i], y[i], w[i], p, band);
+  for (std::size_t i = 0; i < whole; i += kLanes) m.add(load(x + i), load(y + i), load(w + i), p, band);
+  Lane last_x{}, last_y{}, last_w{kPadding_per_m, kPadding_per_m, kPadding_per_m, kPadding_per_m};
+  for (std::size_t i = whole; i < n; ++i) {
+    const int l = static_cast<int>(i - whole);
+    last_x[l] = x[i], last_y[l] = y[i], last_w[l] = w[i];
+  }
+  m.add(last_x, last_y, last_w, p, band);
   return m;
 }
 
@@ -99,16 +113,16 @@ PlaneFit fit_inliers(const InverseDepths& points, const InversePlane& start, con
   const double n = total(m.n);
   fit.inliers = static_cast<int>(n);
   if (fit.inliers < 8) return fit;
-  const double mx = total(m.x) / n, my = total(m.y) / n, mr = total(m.w) / n;
+  const double mx = total(m.x) / n, my = total(m.y) / n, mr = total(m.r) / n;
   const double xx = total(m.xx) / n - mx * mx, xy = total(m.xy) / n - mx * my, yy = total(m.yy) / n - my * my;
-  const double xr = total(m.xw) / n - mx * mr, yr = total(m.yw) / n - my * mr;
+  const double xr = total(m.xr) / n - mx * mr, yr = total(m.yr) / n - my * mr;
   const double det = xx * yy - xy * xy;
   if (!(det > 1e-9)) return fit;
   const double da = (xr * yy - yr * xy) / det, db = (yr * xx - xr * xy) / det;
   fit.plane.a = start.a + static_cast<float>(da);
   fit.plane.b = start.b + static_cast<float>(db);
   fit.plane.c = start.c + static_cast<float>(mr - da * mx - db * my);
-  const double left = std::max(0.0, total(m.ee) / n - mr * mr - da * xr - db * yr);  // residual variance after the fit
+  const double left = std::max(0.0, total(m.rr) / n - mr * mr - da * xr - db * yr);  // residual variance after the fit
   const double height = fit.plane.height_m();
   if (!std::isfinite(height)) return fit;
   // Covariance of (a, b, c) = variance * inverse normal matrix, from the centred moments.

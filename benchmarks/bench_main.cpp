@@ -1,0 +1,37 @@
+// wasp-bench: one row a benchmark.
+#include <CLI/CLI.hpp>
+
+#include "benchmarks/bench.h"
+
+namespace {
+
+struct Row {
+  const char* name;
+  const char* help;
+  int (*run)(const wasp::bench::Options&);
+};
+
+constexpr Row kRows[] = {
+    {"ipc", "a camera frame from process to process, beside iceoryx; publishing under observers", wasp::bench::run_ipc},
+#ifdef WASP_HAVE_BENCHMARK
+    {"micro", "histogram, seqlock, queue, ring and bell, one operation each (Google Benchmark)",
+     wasp::bench::run_micro},
+#endif
+};
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{"Benchmarks of wasp", "wasp-bench"};
+  app.require_subcommand(1);
+  wasp::bench::Options options;
+  const Row* chosen = nullptr;
+  for (const Row& row : kRows) {
+    CLI::App* command = app.add_subcommand(row.name, row.help);
+    command->add_flag("--json", options.json, "one JSON object a line");
+    command->add_option("--seconds", options.seconds, "about how long to measure")->check(CLI::Range(1.0, 3600.0));
+    command->callback([&chosen, &row] { chosen = &row; });
+  }
+  CLI11_PARSE(app, argc, argv);
+  return chosen->run(options);
+}

@@ -1,0 +1,71 @@
+#include "benchmarks/report.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+namespace wasp::bench {
+namespace {
+
+double at(const std::vector<std::int64_t>& sorted, double q) {
+  const auto rank = static_cast<std::size_t>(std::ceil(q * static_cast<double>(sorted.size())));
+  return static_cast<double>(sorted[std::max<std::size_t>(rank, 1) - 1]);
+}
+
+}  // namespace
+
+Quantiles quantiles(std::vector<std::int64_t> samples) {
+  if (samples.empty()) return {};
+  std::sort(samples.begin(), samples.end());
+  return {samples.size(), at(samples, 0.5), at(samples, 0.99), at(samples, 0.999), at(samples, 1)};
+}
+
+void Report::note(const std::string& name, const std::string& text) {
+  if (json_)
+    std::printf("%s\n", nlohmann::json{{"name", name}, {"text", text}, {"ok", true}}.dump().c_str());
+  else
+    std::printf("%-34s %s\n", name.c_str(), text.c_str());
+  std::fflush(stdout);
+}
+
+void Report::print(const std::string& name, double value, const std::string& unit, std::optional<double> bar,
+                   const std::string& remark) {
+  const bool ok = !bar || value <= *bar;
+  met_ = met_ && ok;
+  if (json_) {
+    nlohmann::json line{{"name", name}, {"value", value}, {"unit", unit}, {"bar", nullptr}, {"ok", ok}};
+    if (bar) line["bar"] = *bar;
+    if (!remark.empty()) line["remark"] = remark;
+    std::printf("%s\n", line.dump().c_str());
+  } else {
+    std::printf("%-34s %12.3f %-6s", name.c_str(), value, unit.c_str());
+    if (bar) std::printf(" bar %.2f %s", *bar, ok ? "met" : "MISSED");
+    std::printf("%s%s\n", remark.empty() ? "" : "  ", remark.c_str());
+  }
+  std::fflush(stdout);
+}
+
+void Report::figure(const std::string& name, double value, const std::string& unit, const std::string& remark) {
+  print(name, value, unit, std::nullopt, remark);
+}
+void Report::bar(const std::string& name, double value, const std::string& unit, double bar,
+                 const std::string& remark) {
+  print(name, value, unit, bar, remark);
+}
+
+void Report::row(const std::string& name, const Quantiles& q) {
+  if (json_) {
+    figure(name + ".p50", q.p50, "ns");
+    figure(name + ".p99", q.p99, "ns");
+    figure(name + ".p999", q.p999, "ns");
+    figure(name + ".max", q.max, "ns");
+    figure(name + ".count", static_cast<double>(q.count), "1");
+  } else {
+    std::printf("%-34s p50 %8.0f  p99 %8.0f  p99.9 %9.0f  max %9.0f ns  n %zu\n", name.c_str(), q.p50, q.p99, q.p999,
+                q.max, q.count);
+    std::fflush(stdout);
+  }
+}
+
+}  // namespace wasp::bench

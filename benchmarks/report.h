@@ -1,0 +1,38 @@
+// Results: quantiles of exact samples, and one line a figure, as a table or as JSON.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace wasp::bench {
+
+/// Exact quantiles of nanosecond samples.
+struct Quantiles {
+  std::size_t count = 0;
+  double p50 = 0, p99 = 0, p999 = 0, max = 0;
+};
+Quantiles quantiles(std::vector<std::int64_t> samples_ns);
+
+/// Prints figures as they come and remembers whether every bar was met.
+class Report {
+ public:
+  explicit Report(bool json) : json_(json) {}
+
+  /// Machine, kernel and whatever else a figure's reader must know.
+  void note(const std::string& name, const std::string& text);
+  void figure(const std::string& name, double value, const std::string& unit, const std::string& remark = {});
+  /// A figure that must not exceed `bar`.
+  void bar(const std::string& name, double value, const std::string& unit, double bar, const std::string& remark = {});
+  void row(const std::string& name, const Quantiles& q);
+  [[nodiscard]] bool met() const { return met_; }
+
+ private:
+  void print(const std::string& name, double value, const std::string& unit, std::optional<double> bar,
+             const std::string& remark);
+  bool json_;
+  bool met_ = true;
+};
+
+}  // namespace wasp::bench

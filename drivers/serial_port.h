@@ -1,0 +1,74 @@
+// A serial line in raw mode, non-blocking, for one process. The file descriptor keeps its number for the life of the
+// object: losing and reopening the device swaps what stands behind it (dup3), so a thread that writes while another
+// reopens gets kGone, never somebody else's file.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "rt/contract.h"
+#include "types/time.h"
+
+namespace wasp::drivers {
+
+/// Where the line is and how fast: "serial:/dev/ttyUSB0:921600".
+struct SerialEndpoint {
+  std::string path;
+  unsigned baud = 921600;  ///< one of the rates of termios, 1200 ... 4000000
+
+  /// Throws std::runtime_error naming the text and what is wrong with it. The path may contain colons.
+  static SerialEndpoint parse(std::string_view text);
+};
+
+enum class IoStatus : std::uint8_t {
+  kOk,          ///< at least one byte moved
+  kWouldBlock,  ///< nothing to read, or no room to write, now
+  kGone,        ///< hung up, unplugged or never there: try_reopen
+};
+
+struct IoResult {
+  IoStatus status = IoStatus::kGone;
+  std::size_t bytes = 0;  ///< moved; for a write it may be fewer than offered
+};
+
+class SerialPort {
+ public:
+  /// Opens, takes exclusive use and sets up the line. Throws std::runtime_error naming the device and the reason.
+  explicit SerialPort(SerialEndpoint endpoint);
+  ~SerialPort();
+  SerialPort(const SerialPort&) = delete;
+  SerialPort& operator=(const SerialPort&) = delete;
+
+  /// Hands bytes to the kernel; never waits. Realtime-safe: yes (one write).
+  IoResult write(std::span<const std::uint8_t> bytes) WASP_REALTIME;
+  /// Takes what has arrived; never waits. Realtime-safe: yes (one read, and a poll when it was empty).
+  IoResult read(std::span<std::uint8_t> bytes) WASP_REALTIME;
+  /// Sleeps until there is something to read, the line is gone (true as well: read tells), or the deadline has passed
+  /// (false). Realtime-safe: yes (ppoll).
+  bool wait_readable(TimeNs deadline_ns) WASP_REALTIME;
+  /// Bytes the kernel has not sent yet; -1 when the driver does not say. Realtime-safe: yes (one ioctl).
+  [[nodiscard]] long pending_output_bytes() const WASP_REALTIME;
+
+  /// Lets the device go, so that it can come back under the same name, and looks for it once. False while it is absent
+  /// or refused; `last_error` says why. One thread only. Realtime-safe: no (open).
+  bool try_reopen() noexcept;
+  /// Lets the device go; reads and writes return kGone until try_reopen succeeds.
+  void release() noexcept;
+
+  [[nodiscard]] int fd() const noexcept { return fd_; }
+  [[nodiscard]] int last_error() const noexcept { return last_error_; }  ///< errno of the last failed try_reopen
+  [[nodiscard]] const SerialEndpoint& endpoint() const noexcept { return endpoint_; }
+
+ private:
+  int open_device() noexcept;
+
+  SerialEndpoint endpoint_;
+  int nothing_fd_ = -1;  ///< refuses reads and writes; stands in while the device is away
+  int fd_ = -1;
+  int last_error_ = 0;
+};
+
+}  // namespace wasp::drivers

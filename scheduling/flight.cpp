@@ -1,0 +1,237 @@
+#include "scheduling/flight.h"
+
+#include <signal.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <memory>
+
+#include "drivers/recording.h"
+#include "rt/clock.h"
+#include "rt/process.h"
+#include "rt/thread.h"
+#include "scheduling/control_loop.h"
+#include "scheduling/flight_regions.h"
+#include "scheduling/link_loop.h"
+#include "scheduling/replay_camera.h"
+#include "shm/topics.h"
+
+namespace wasp::scheduling {
+namespace {
+
+struct Options {
+  std::string instance = "wasp";
+  std::vector<std::string> configs;
+  std::string replay;
+  double seconds = 0;
+  bool no_rt = false;
+};
+
+void log(const char* text) { std::fprintf(stderr, "%10.3f  %s\n", to_seconds(rt::now()), text); }
+void log(const std::string& text) { log(text.c_str()); }
+
+/// Blocks the signals that end a flight, for every thread made from here on; the main thread takes them in turn.
+sigset_t block_signals() {
+  sigset_t set;
+  sigemptyset(&set);
+  for (const int s : {SIGINT, SIGTERM, SIGHUP}) sigaddset(&set, s);
+  pthread_sigmask(SIG_BLOCK, &set, nullptr);
+  signal(SIGPIPE, SIG_IGN);
+  return set;
+}
+
+std::vector<std::string> names_of(const BehaviourTable& table) {
+  std::vector<std::string> names;
+  for (const auto& row : table) names.push_back(row.name);
+  return names;
+}
+
+drivers::LinkIdentity identity_of(const Config& config) {
+  drivers::LinkIdentity id;
+  id.system_id = id.autopilot_system_id = static_cast<std::uint8_t>(config.system_id);
+  id.component_id = static_cast<std::uint8_t>(config.component_id);
+  return id;
+}
+
+/// Everything one flight owns, in order of construction; destroyed in reverse, threads first.
+class Flight {
+ public:
+  Flight(const BehaviourTable& table, const Options& options, Config config)
+      : table_(table),
+        options_(options),
+        config_(std::move(config)),
+        real_time_(!options.no_rt),
+        flight_(create_flight_region(options.instance, names_of(table), real_time_)),
+        stages_(stage_table(flight_)),
+        port_(drivers::SerialEndpoint::parse(config_.endpoint)),
+        autopilot_(identity_of(config_)) {
+    control_.status = &run_status(flight_);
+    control_.status->preempt_rt = rt::kernel_is_preempt_rt() ? 1 : 0;
+    control_.strict_syscalls = config_.strict_syscalls;
+  }
+
+  int run(const sigset_t& signals) {
+    open_camera();
+    wire();
+    prepare_real_time();
+    start_threads();
+    control_.realtime_started = true;
+    log(real_time_ ? "armed for real time" : "running, NOT REAL TIME");
+    supervise(signals);
+    return conclude();
+  }
+
+ private:
+  void open_camera() {
+    if (options_.replay.empty()) {
+      camera_ = std::make_unique<shm::Region>(attach_camera(options_.instance, 30.0, [] { return false; }));
+      return;
+    }
+    auto recording = drivers::Recording::open(options_.replay);
+    for (const auto& problem : recording.problems()) log("recording: " + problem);
+    config_.camera = recording.geometry();
+    scripts_ = load_replay_script(options_.replay);
+    const double seconds = options_.seconds > 0 ? options_.seconds : to_seconds(ReplayCamera::lap_ns(recording));
+    config_.control.mission.follow_recording = true;
+    config_.control.mission.recording_seconds = static_cast<float>(seconds);
+    camera_ = std::make_unique<shm::Region>(shm::Region::create(shm::camera_region(options_.instance), ReplayCamera::topics(recording)));
+    replay_ = std::make_unique<ReplayCamera>(std::move(recording), *camera_, from_seconds(seconds), stages_);
+  }
+
+  void wire() {
+    for (std::size_t i = 0; i < table_.size(); ++i) {
+      const BehaviourRow& row = table_[i];
+      BehaviourWiring w;
+      w.camera = camera_.get();
+      w.flight = &flight_;
+      w.index = static_cast<std::uint32_t>(i);
+      w.budget_ns = config_.behaviours[i].budget_ns;
+      w.stages = &stages_;
+      if (replay_) {
+        w.attitude_from_link = false;
+        w.frames_done = replay_->add_reader(row.stream == Stream::kDepth);
+        if (const auto script = scripts_.find(row.name); script != scripts_.end()) w.script = &script->second;
+      }
+      bodies_.push_back(row.make(config_.camera, w));
+    }
+    link_ = std::make_unique<LinkLoop>(flight_, port_, autopilot_, stages_, report_, link_events_);
+    control_loop_ = std::make_unique<ControlLoop>(config_, ControlWiring{&flight_, &stages_, &report_, &port_, &autopilot_, &control_events_});
+  }
+
+  /// Locks memory and keeps the processor awake; refuses by name where a right is missing.
+  void prepare_real_time() {
+    if (!real_time_) return;
+    std::string refusal;
+    for (const auto& m : rt::missing_rights(config_.control_thread.priority)) refusal += "\n  missing right: " + m.right + "; grant it with: " + m.remedy;
+    if (!refusal.empty()) throw std::runtime_error("refusing to arm without real time (or say --no-rt):" + refusal);
+    latency_hold_ = std::make_unique<rt::CpuLatencyHold>();
+    if (!latency_hold_->held()) log("note: /dev/cpu_dma_latency is not available; the processor may sleep deeply");
+    if (const std::string why = rt::lock_memory(static_cast<std::size_t>(config_.heap_mib) << 20); !why.empty()) throw std::runtime_error("refusing to arm: " + why);
+  }
+
+  rt::ThreadSpec spec(const ThreadRow& row) const {
+    rt::ThreadSpec s;
+    s.name = row.name;
+    s.policy = real_time_ ? rt::Policy::kFifo : rt::Policy::kOther;
+    s.priority = row.priority;
+    s.core = rt::nearest_usable_core(row.core);
+    return s;
+  }
+
+  void start_threads() {
+    for (std::size_t i = 0; i < bodies_.size(); ++i) threads_.emplace_back(spec(config_.behaviours[i]), [this, i] { bodies_[i](control_); });
+    threads_.emplace_back(spec(config_.link_thread), [this] { link_->run(control_); });
+    if (replay_) {
+      threads_.emplace_back(spec(config_.camera_thread), [this] { replay_->run(control_); });
+      rt::ThreadSpec decoder;
+      decoder.name = "decoder";
+      threads_.emplace_back(decoder, [this] { replay_->decode(control_); });
+    }
+    threads_.emplace_back(spec(config_.control_thread), [this] { control_loop_->run(control_); });
+  }
+
+  void drain_events() {
+    Event e;
+    for (EventQueue* queue : {&control_events_, &link_events_})
+      while (queue->take(e)) log(e.text.data());
+  }
+
+  void supervise(const sigset_t& signals) {
+    while (!control_loop_->mission_over()) {
+      const timespec patience = rt::to_timespec(100 * kMillisecond);
+      if (sigtimedwait(&signals, nullptr, &patience) > 0) {
+        if (control_.stop_requested.exchange(true)) break;  // the second signal: stop at once
+        log("stop requested: landing in order");
+      }
+      drain_events();
+    }
+    control_.stop = true;
+    threads_.clear();
+    drain_events();
+  }
+
+  int conclude() {
+    RunStatus& status = *control_.status;
+    if (replay_ && replay_->held_back() > 0) log("replay: the camera was held back " + std::to_string(replay_->held_back()) + " times for a slow reader");
+    if (replay_ && replay_->decode_errors() > 0) log("replay: " + std::to_string(replay_->decode_errors()) + " frames could not be decoded");
+    log("page faults in real-time threads: " + std::to_string(status.minor_faults) + " minor, " + std::to_string(status.major_faults) + " major");
+    const bool flown = status.mission_result.load() == 1;
+    log(flown ? "mission flown to its end" : "mission broken off");
+    status.finished = 1;
+    return flown ? 0 : 1;
+  }
+
+  const BehaviourTable& table_;
+  Options options_;
+  Config config_;
+  bool real_time_;
+  shm::Region flight_;
+  StageTable& stages_;
+  drivers::SerialPort port_;
+  drivers::AutopilotLink autopilot_;
+  std::unique_ptr<shm::Region> camera_;
+  std::map<std::string, BehaviourScript> scripts_;
+  std::unique_ptr<ReplayCamera> replay_;
+  std::unique_ptr<rt::CpuLatencyHold> latency_hold_;
+  rt::Seqlock<LinkReport> report_;
+  EventQueue control_events_, link_events_;
+  LoopControl control_;
+  std::unique_ptr<LinkLoop> link_;
+  std::unique_ptr<ControlLoop> control_loop_;
+  std::vector<std::function<void(LoopControl&)>> bodies_;
+  std::vector<rt::Thread> threads_;  // joined first
+};
+
+std::optional<int> parse(int argc, char** argv, Options& o) {
+  CLI::App app{"The flying process alone; `wasp fly` starts it together with simulator, recorder and report."};
+  app.name("wasp flight");
+  app.option_defaults()->always_capture_default();
+  app.add_option("--instance", o.instance, "name of its shared memory: wasp.NAME.flight");
+  app.add_option("--config", o.configs, "TOML files in order, later ones override single keys")->check(CLI::ExistingFile);
+  app.add_option("--replay", o.replay, "take frames from this recording");
+  app.add_option("--seconds", o.seconds, "length of a replay (0: once through)");
+  app.add_flag("--no-rt", o.no_rt, "ordinary scheduling, no locked memory; every figure is marked 'not real time'");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? 0 : 2;
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+int flight_main(const BehaviourTable& behaviours, int argc, char** argv) {
+  Options options;
+  if (const auto code = parse(argc, argv, options)) return *code;
+  const sigset_t signals = block_signals();
+  try {
+    Flight flight(behaviours, options, load_config(options.configs, names_of(behaviours)));
+    return flight.run(signals);
+  } catch (const std::exception& e) {
+    std::fprintf(stderr, "wasp flight: %s\n", e.what());
+    return 1;
+  }
+}
+
+}  // namespace wasp::scheduling

@@ -1,0 +1,90 @@
+#include "scheduling/link_loop.h"
+
+#include "rt/clock.h"
+#include "shm/topics.h"
+
+namespace wasp::scheduling {
+namespace {
+constexpr DurationNs kPatience = 20 * kMillisecond;        // longest sleep: the stop flag is seen by then
+constexpr DurationNs kTimesyncPeriod = 200 * kMillisecond;
+constexpr DurationNs kReopenPeriod = 50 * kMillisecond;
+constexpr int kRoomForReply_bytes = 1024;                  // pending output below which an answer may go out
+constexpr int kReadsPerWake = 8;
+}  // namespace
+
+LinkLoop::LinkLoop(const shm::Region& flight, drivers::SerialPort& port, drivers::AutopilotLink& autopilot, StageTable& stages,
+                   rt::Seqlock<LinkReport>& report, EventQueue& events)
+    : port_(port),
+      autopilot_(autopilot),
+      imu_(flight, shm::kImu, "Imu"),
+      attitude_(flight, shm::kAttitude, "Attitude"),
+      age_(stages.add("link", "imu age", 0)),
+      report_(report),
+      events_(events) {}
+
+void LinkLoop::run(LoopControl& control) {
+  RealtimeLoop loop(control);
+  while (loop.tick()) serve(control);
+}
+
+void LinkLoop::serve(LoopControl& control) WASP_REALTIME {
+  if (gone_) return reopen(control);
+  ask_for_time(rt::now());
+  if (!port_.wait_readable(rt::now() + kPatience)) return;
+  for (int i = 0; i < kReadsPerWake; ++i) {  // bounded: a flood cannot hold this thread for ever
+    const drivers::IoResult got = port_.read(buffer_);
+    if (got.status == drivers::IoStatus::kGone) {
+      gone_ = true;
+      events_.say(rt::now(), "serial line gone: ", port_.endpoint().path);
+    }
+    if (got.bytes == 0) break;
+    received_at_ns_ = rt::now();
+    const auto good_before = autopilot_.wire_counts().good;
+    autopilot_.receive(std::span<const std::uint8_t>(buffer_.data(), got.bytes), received_at_ns_, *this);
+    if (autopilot_.wire_counts().good != good_before) {
+      now_.heard_at_ns = received_at_ns_;
+      report_.store(now_);
+    }
+  }
+  control.status->bad_frames.store(autopilot_.wire_counts().bad_crc, std::memory_order_relaxed);
+}
+
+void LinkLoop::ask_for_time(TimeNs now_ns) WASP_REALTIME {
+  if (now_ns < timesync_due_ns_) return;
+  timesync_due_ns_ = now_ns + kTimesyncPeriod;
+  std::array<std::uint8_t, mavlink::kMaxFrame> out;
+  reply(std::span<const std::uint8_t>(out.data(), autopilot_.encode_timesync_request(now_ns, out)));
+}
+
+void LinkLoop::reopen(LoopControl& control) WASP_REALTIME {
+  rt::sleep_until(rt::now() + kReopenPeriod);
+  if (!port_.try_reopen()) return;
+  gone_ = false;
+  autopilot_.restart();
+  control.status->link_reconnects.fetch_add(1, std::memory_order_relaxed);
+  events_.say(rt::now(), "serial line reopened");
+}
+
+void LinkLoop::on_imu(const ImuSample& sample) WASP_REALTIME {
+  imu_.write(sample, received_at_ns_);
+  age_->record(received_at_ns_ - sample.exposed_at_ns);
+}
+
+void LinkLoop::on_attitude(const AttitudeSample& sample) WASP_REALTIME { attitude_.write(sample, received_at_ns_); }
+
+void LinkLoop::on_heartbeat(const drivers::AutopilotStatus& status) WASP_REALTIME {
+  now_.armed = status.armed ? 1 : 0;
+  now_.custom_mode = status.custom_mode;
+}
+
+void LinkLoop::on_ack(std::uint16_t, std::uint8_t result) WASP_REALTIME {
+  if (result != 0) events_.say(received_at_ns_, "autopilot refused a command");
+}
+
+void LinkLoop::on_statustext(std::uint8_t, std::string_view text) WASP_REALTIME { events_.say(received_at_ns_, "autopilot: ", text); }
+
+void LinkLoop::reply(std::span<const std::uint8_t> bytes) WASP_REALTIME {
+  if (port_.pending_output_bytes() < kRoomForReply_bytes) port_.write(bytes);
+}
+
+}  // namespace wasp::scheduling

@@ -1,0 +1,49 @@
+// The link thread: bytes from the serial line become IMU and attitude samples in the rings and a report on the autopilot.
+// It asks for the autopilot's time and answers
+// when asked (only while the line has room, so that an answer never splits a setpoint) and reopens a
+// lost line by itself.
+#pragma once
+
+#include "drivers/autopilot_link.h"
+#include "drivers/serial_port.h"
+#include "rt/seqlock.h"
+#include "scheduling/control_loop.h"
+#include "scheduling/events.h"
+#include "scheduling/realtime_loop.h"
+#include "shm/broadcast_ring.h"
+
+namespace wasp::scheduling {
+
+class LinkLoop {
+ public:
+  LinkLoop(const shm::Region& flight, drivers::SerialPort& port, drivers::AutopilotLink& autopilot, StageTable& stages,
+           rt::Seqlock<LinkReport>& report, EventQueue& events);
+  /// Runs until the stop flag. Real-time loop.
+  void run(LoopControl& control);
+
+  // What AutopilotLink::receive calls.
+  void on_imu(const ImuSample& sample) WASP_REALTIME;
+  void on_attitude(const AttitudeSample& sample) WASP_REALTIME;
+  void on_heartbeat(const drivers::AutopilotStatus& status) WASP_REALTIME;
+  void on_ack(std::uint16_t command, std::uint8_t result) WASP_REALTIME;
+  void on_statustext(std::uint8_t severity, std::string_view text) WASP_REALTIME;
+  void reply(std::span<const std::uint8_t> bytes) WASP_REALTIME;
+
+ private:
+  void serve(LoopControl& control) WASP_REALTIME;
+  void ask_for_time(TimeNs now_ns) WASP_REALTIME;
+  void reopen(LoopControl& control) WASP_REALTIME;
+
+  drivers::SerialPort& port_;
+  drivers::AutopilotLink& autopilot_;
+  shm::RingWriter imu_, attitude_;
+  Stage* age_;
+  rt::Seqlock<LinkReport>& report_;
+  EventQueue& events_;
+  LinkReport now_;
+  TimeNs received_at_ns_ = 0, timesync_due_ns_ = 0;
+  bool gone_ = false;
+  std::array<std::uint8_t, 4096> buffer_{};
+};
+
+}  // namespace wasp::scheduling
