@@ -1,9 +1,12 @@
 // wasp bench ipc: a 640x480 mono8 frame from one process to another through wasp's ring and through iceoryx, in the
 // same run, in interleaved blocks: each repeat runs every mode of both, one after the other, in fresh processes.
+#include <signal.h>
 #include <sys/mman.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
+#include <cstdlib>
 #include <map>
 #include <memory>
 #include <new>
@@ -97,6 +100,15 @@ void report_ratios(Report& report, const ModeRow& row, const Pool& ours, const P
   ratio("p999", a.p999 / b.p999, row.p999_bar, {});
 }
 
+/// Regions of an earlier run that was killed with SIGKILL, the one signal that leaves them behind.
+void sweep_up() {
+  const std::string prefix = "wasp.bench.";
+  for (const std::string& name : shm::Region::list(prefix)) {
+    const pid_t owner = std::atoi(name.c_str() + prefix.size());
+    if (owner > 0 && kill(owner, 0) != 0 && errno == ESRCH) shm::Region::remove(name);
+  }
+}
+
 /// Runs the blocks; false if something broke or was interrupted.
 bool run_blocks(const std::vector<Contender>& contenders, const Placement& placement, Run& run,
                 std::map<std::string, Pool>& pools) {
@@ -112,6 +124,7 @@ bool run_blocks(const std::vector<Contender>& contenders, const Placement& place
 
 int run_ipc(const Options& options) {
   catch_interrupts();
+  sweep_up();
   Report report(options.json);
   const Placement placement = choose_placement();
   Run* run = shared_run();

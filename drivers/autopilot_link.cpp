@@ -152,8 +152,7 @@ std::size_t AutopilotLink::encode_command(std::uint16_t command, const std::arra
       out);
 }
 
-std::size_t AutopilotLink::encode_arm(bool arm, std::uint8_t confirmation,
-                                      std::span<std::uint8_t> out) WASP_REALTIME {
+std::size_t AutopilotLink::encode_arm(bool arm, std::uint8_t confirmation, std::span<std::uint8_t> out) WASP_REALTIME {
   return encode_command(mavlink::mav_cmd::kComponentArmDisarm, {arm ? 1.f : 0.f}, confirmation, out);
 }
 

@@ -28,7 +28,7 @@ struct LinkIdentity {
 /// HEARTBEAT of the autopilot.
 struct AutopilotStatus {
   TimeNs received_at_ns = kNever;
-  std::uint32_t custom_mode = 0;   ///< PX4: main mode in bits 16-23, sub mode in 24-31; ArduPilot: the mode number
+  std::uint32_t custom_mode = 0;  ///< PX4: main mode in bits 16-23, sub mode in 24-31; ArduPilot: the mode number
   std::uint8_t base_mode = 0;
   bool armed = false;
   std::uint8_t system_status = 0;  ///< MAV_STATE
@@ -45,19 +45,20 @@ struct AttitudeTargetCommand {
 };
 
 struct LinkCounts {
-  std::uint64_t own_echoes = 0;        ///< frames with our own sender ids
-  std::uint64_t foreign_systems = 0;   ///< frames of other system ids
-  std::uint64_t other_components = 0;  ///< frames of other components of the vehicle
-  std::uint64_t not_for_us = 0;        ///< addressed to somebody else
-  std::uint64_t refused_samples = 0;   ///< not finite, or a quaternion without direction
-  std::uint64_t partial_samples = 0;   ///< passed on without a side channel that was not finite
-  std::uint64_t outranked_samples = 0; ///< a better message carries the same quantity
-  std::uint64_t unmapped_times = 0;    ///< stamped with the arrival time: not synced yet, or a time not credible
-  std::uint64_t clock_restarts = 0;    ///< the autopilot's clock jumped
+  std::uint64_t own_echoes = 0;         ///< frames with our own sender ids
+  std::uint64_t foreign_systems = 0;    ///< frames of other system ids
+  std::uint64_t other_components = 0;   ///< frames of other components of the vehicle
+  std::uint64_t not_for_us = 0;         ///< addressed to somebody else
+  std::uint64_t refused_samples = 0;    ///< not finite, or a quaternion without direction
+  std::uint64_t partial_samples = 0;    ///< passed on without a side channel that was not finite
+  std::uint64_t outranked_samples = 0;  ///< a better message carries the same quantity
+  std::uint64_t unmapped_times = 0;     ///< stamped with the arrival time: not synced yet, or a time not credible
+  std::uint64_t clock_restarts = 0;     ///< the autopilot's clock jumped
   std::uint64_t timesync_accepted = 0, timesync_refused = 0;
 };
 
-/// Lets only the best of several messages with the same content through; a worse one steps in after a second of silence.
+/// Lets only the best of several messages with the same content through; a worse one steps in after a second of
+/// silence.
 class PreferredSource {
  public:
   /// Rank 0 is best.
@@ -79,9 +80,9 @@ class AutopilotLink {
       : identity_(identity), encoder_(identity.system_id, identity.component_id) {}
 
   /// Takes bytes that arrived at `received_at_ns`. The sink has, all noexcept: on_imu(const ImuSample&),
-  /// on_attitude(const AttitudeSample&), on_heartbeat(const AutopilotStatus&), on_ack(uint16_t command, uint8_t result),
-  /// on_statustext(uint8_t severity, std::string_view), reply(std::span<const uint8_t>) for frames that must go out.
-  /// Sample times never lie after `received_at_ns`. Realtime-safe: yes if the sink is.
+  /// on_attitude(const AttitudeSample&), on_heartbeat(const AutopilotStatus&), on_ack(uint16_t command, uint8_t
+  /// result), on_statustext(uint8_t severity, std::string_view), reply(std::span<const uint8_t>) for frames that must
+  /// go out. Sample times never lie after `received_at_ns`. Realtime-safe: yes if the sink is.
   template <class Sink>
   void receive(std::span<const std::uint8_t> bytes, TimeNs received_at_ns, Sink& sink) WASP_REALTIME {
     parser_.feed(bytes, [&](const mavlink::Frame& frame) noexcept {
@@ -245,7 +246,7 @@ class AutopilotLink {
   mavlink::Parser parser_;
   mavlink::Encoder encoder_;
   ClockMap clock_;
-  std::array<TimeNs, 8> asked_at_ns_{};               ///< ts1 of open questions, 0 when answered
+  std::array<TimeNs, 8> asked_at_ns_{};  ///< ts1 of open questions, 0 when answered
   std::size_t next_question_ = 0;
   std::atomic<DurationNs> shared_offset_ns_{kNever};  ///< autopilot clock minus ours, for the encoders
   std::array<TimeNs, kStreams> last_remote_ns_{-1, -1};

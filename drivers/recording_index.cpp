@@ -26,7 +26,7 @@ bool parse_seconds(const std::string& text, TimeNs& out) {
 
 double number(const toml::value& value, const std::string& key, const std::filesystem::path& file, double low,
               double high) {
-  const double x = value.is_integer() ? static_cast<double>(value.as_integer())
+  const double x = value.is_integer()    ? static_cast<double>(value.as_integer())
                    : value.is_floating() ? value.as_floating()
                                          : std::numeric_limits<double>::quiet_NaN();
   if (!(x >= low && x <= high))
@@ -110,16 +110,26 @@ void read_camera_toml(const std::filesystem::path& file, Listing& listing) {
   Intrinsics& k = listing.intrinsics;
   const auto real = [](double x) { return static_cast<float>(x); };
   for (const auto& [key, value] : root.as_table()) {
-    if (key == "width_px") k.width_px = static_cast<int>(number(value, key, file, 1, 16384));
-    else if (key == "height_px") k.height_px = static_cast<int>(number(value, key, file, 1, 16384));
-    else if (key == "fx_px") k.fx_px = real(number(value, key, file, 1, 1e5));
-    else if (key == "fy_px") k.fy_px = real(number(value, key, file, 1, 1e5));
-    else if (key == "cx_px") k.cx_px = real(number(value, key, file, -1e5, 1e5));
-    else if (key == "cy_px") k.cy_px = real(number(value, key, file, -1e5, 1e5));
-    else if (key == "pitch_down_deg") listing.pitch_down = to_radians(Degrees{number(value, key, file, -90, 90)});
-    else if (key == "depth_units_per_m") listing.depth_units_per_m = number(value, key, file, 1, 1e6);
-    else if (key == "rate_hz") listing.nominal_rate_hz = number(value, key, file, 0.01, 10000);
-    else if (key == "position_body_m") listing.position_body_m = position(value, file);
+    if (key == "width_px")
+      k.width_px = static_cast<int>(number(value, key, file, 1, 16384));
+    else if (key == "height_px")
+      k.height_px = static_cast<int>(number(value, key, file, 1, 16384));
+    else if (key == "fx_px")
+      k.fx_px = real(number(value, key, file, 1, 1e5));
+    else if (key == "fy_px")
+      k.fy_px = real(number(value, key, file, 1, 1e5));
+    else if (key == "cx_px")
+      k.cx_px = real(number(value, key, file, -1e5, 1e5));
+    else if (key == "cy_px")
+      k.cy_px = real(number(value, key, file, -1e5, 1e5));
+    else if (key == "pitch_down_deg")
+      listing.pitch_down = to_radians(Degrees{number(value, key, file, -90, 90)});
+    else if (key == "depth_units_per_m")
+      listing.depth_units_per_m = number(value, key, file, 1, 1e6);
+    else if (key == "rate_hz")
+      listing.nominal_rate_hz = number(value, key, file, 0.01, 10000);
+    else if (key == "position_body_m")
+      listing.position_body_m = position(value, file);
     else
       throw std::runtime_error(file.string() + ":" + std::to_string(value.location().line()) + ": unknown key '" + key +
                                "'");

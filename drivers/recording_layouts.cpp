@@ -42,7 +42,8 @@ Intrinsics pinhole(int width_px, int height_px, float fx_px, float fy_px, float 
 TimeNs at_rate(std::uint32_t index, double rate_hz) { return std::llround(index * 1e9 / rate_hz); }
 
 /// Files matching prefix + digits + suffix, by number. `prefix` may be empty.
-std::map<std::uint32_t, std::string> numbered(const Names& names, const std::string& prefix, const std::string& suffix) {
+std::map<std::uint32_t, std::string> numbered(const Names& names, const std::string& prefix,
+                                              const std::string& suffix) {
   std::map<std::uint32_t, std::string> out;
   for (const std::string& name : names) {
     if (!name.starts_with(prefix) || !name.ends_with(suffix) || name.size() <= prefix.size() + suffix.size()) continue;
@@ -118,8 +119,8 @@ std::optional<Listing> list_named_depth(const fs::path& folder, const Names& nam
     if (!name.ends_with(kSuffix)) continue;
     const std::string color = name.substr(0, name.size() - kSuffix.size()) + "_rgb.png";
     const auto index = static_cast<std::uint32_t>(listing.frames.size());
-    listing.frames.push_back({at_rate(index, 30.0), index, folder / name,
-                              contains(names, color) ? folder / color : fs::path{}, name});
+    listing.frames.push_back(
+        {at_rate(index, 30.0), index, folder / name, contains(names, color) ? folder / color : fs::path{}, name});
   }
   if (listing.frames.empty()) return std::nullopt;
   return listing;
@@ -183,8 +184,8 @@ std::optional<Listing> list_numbered_png(const fs::path& folder, const Names& na
         listing.intrinsics.cx_px = 0.5f * static_cast<float>(info.width_px - 1);
         listing.intrinsics.cy_px = 0.5f * static_cast<float>(info.height_px - 1);
       }
-      listing.frames.push_back({time_ns, number, depth ? folder / name : fs::path{},
-                                depth ? fs::path{} : folder / name, name});
+      listing.frames.push_back(
+          {time_ns, number, depth ? folder / name : fs::path{}, depth ? fs::path{} : folder / name, name});
     } catch (const std::runtime_error& error) {
       listing.problems.emplace_back(error.what());
     }
@@ -193,8 +194,8 @@ std::optional<Listing> list_numbered_png(const fs::path& folder, const Names& na
   return listing;
 }
 
-constexpr std::array kLayouts = {&list_tum, &list_7scenes, &list_tum_pair, &list_pgm,
-                                 &list_named_depth, &list_hover, &list_numbered_png};
+constexpr std::array kLayouts = {&list_tum,         &list_7scenes, &list_tum_pair,    &list_pgm,
+                                 &list_named_depth, &list_hover,   &list_numbered_png};
 
 /// A folder of clips is not a recording; say which of its sub-folders are.
 [[noreturn]] void refuse(const fs::path& folder) {

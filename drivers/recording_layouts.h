@@ -22,9 +22,9 @@ struct ListedFrame {
 /// What a layout says about a folder.
 struct Listing {
   std::string layout{};
-  std::vector<ListedFrame> frames{};   ///< in the order of the recording
-  std::vector<std::string> problems{}; ///< lines that could not be read
-  Intrinsics intrinsics{};             ///< for 640x480 unless the layout says otherwise
+  std::vector<ListedFrame> frames{};    ///< in the order of the recording
+  std::vector<std::string> problems{};  ///< lines that could not be read
+  Intrinsics intrinsics{};              ///< for 640x480 unless the layout says otherwise
   std::optional<Radians> pitch_down{};
   Vec3 position_body_m = Vec3::Zero();
   double nominal_rate_hz = 30.0;

@@ -5,6 +5,8 @@
 #include <poll.h>
 #include <sys/file.h>
 #include <sys/ioctl.h>
+#include <sys/stat.h>
+#include <sys/sysmacros.h>
 #include <termios.h>
 #include <unistd.h>
 
@@ -24,13 +26,13 @@ struct BaudRow {
   unsigned baud;
   speed_t code;
 };
-constexpr std::array kBauds{
-    BaudRow{1200, B1200},       BaudRow{2400, B2400},       BaudRow{4800, B4800},       BaudRow{9600, B9600},
-    BaudRow{19200, B19200},     BaudRow{38400, B38400},     BaudRow{57600, B57600},     BaudRow{115200, B115200},
-    BaudRow{230400, B230400},   BaudRow{460800, B460800},   BaudRow{500000, B500000},   BaudRow{576000, B576000},
-    BaudRow{921600, B921600},   BaudRow{1000000, B1000000}, BaudRow{1152000, B1152000}, BaudRow{1500000, B1500000},
-    BaudRow{2000000, B2000000}, BaudRow{2500000, B2500000}, BaudRow{3000000, B3000000}, BaudRow{3500000, B3500000},
-    BaudRow{4000000, B4000000}};
+constexpr std::array kBauds{BaudRow{1200, B1200},       BaudRow{2400, B2400},       BaudRow{4800, B4800},
+                            BaudRow{9600, B9600},       BaudRow{19200, B19200},     BaudRow{38400, B38400},
+                            BaudRow{57600, B57600},     BaudRow{115200, B115200},   BaudRow{230400, B230400},
+                            BaudRow{460800, B460800},   BaudRow{500000, B500000},   BaudRow{576000, B576000},
+                            BaudRow{921600, B921600},   BaudRow{1000000, B1000000}, BaudRow{1152000, B1152000},
+                            BaudRow{1500000, B1500000}, BaudRow{2000000, B2000000}, BaudRow{2500000, B2500000},
+                            BaudRow{3000000, B3000000}, BaudRow{3500000, B3500000}, BaudRow{4000000, B4000000}};
 
 /// 0 (B0 hangs up, so it is never a wish) for a rate termios lacks.
 speed_t baud_code(unsigned baud) noexcept {
@@ -59,8 +61,19 @@ void ask_low_latency(int fd) noexcept {
   static_cast<void>(ioctl(fd, TIOCSSERIAL, &serial));
 }
 
-/// TIOCEXCL keeps other users out, the lock other instances that run as root.
-bool take_exclusive(int fd) noexcept { return flock(fd, LOCK_EX | LOCK_NB) == 0 && ioctl(fd, TIOCEXCL) == 0; }
+/// A pseudo-terminal's line end: a simulator is behind it.
+bool is_pseudo_terminal(int fd) noexcept {
+  constexpr unsigned kFirstMajor = 136, kLastMajor = 143;  // Unix98 slaves, Linux devices.txt
+  struct stat info {};
+  return fstat(fd, &info) == 0 && major(info.st_rdev) >= kFirstMajor && major(info.st_rdev) <= kLastMajor;
+}
+
+/// The lock keeps other instances out and dies with the process; TIOCEXCL keeps out programs that probe modems. A
+/// pseudo-terminal goes without TIOCEXCL: nobody probes it, and where the simulator holds the line end open as well the
+/// flag would outlive a killed process and shut out its successor.
+bool take_exclusive(int fd) noexcept {
+  return flock(fd, LOCK_EX | LOCK_NB) == 0 && (is_pseudo_terminal(fd) || ioctl(fd, TIOCEXCL) == 0);
+}
 
 IoStatus status_of_errno() noexcept {
   return errno == EAGAIN || errno == EINTR ? IoStatus::kWouldBlock : IoStatus::kGone;

@@ -22,9 +22,16 @@ std::size_t Encoder::write(std::uint32_t id, std::uint8_t crc_extra, std::span<c
   const std::size_t total = kHeaderV2 + n + kChecksumBytes;
   if (out.size() < total) return 0;
   const std::uint8_t sequence = std::atomic_ref(sequence_).fetch_add(1, std::memory_order_relaxed);
-  const std::array<std::uint8_t, kHeaderV2> header{
-      kStartV2, static_cast<std::uint8_t>(n), incompat_flags, 0, sequence, system_id_, component_id_,
-      static_cast<std::uint8_t>(id), static_cast<std::uint8_t>(id >> 8), static_cast<std::uint8_t>(id >> 16)};
+  const std::array<std::uint8_t, kHeaderV2> header{kStartV2,
+                                                   static_cast<std::uint8_t>(n),
+                                                   incompat_flags,
+                                                   0,
+                                                   sequence,
+                                                   system_id_,
+                                                   component_id_,
+                                                   static_cast<std::uint8_t>(id),
+                                                   static_cast<std::uint8_t>(id >> 8),
+                                                   static_cast<std::uint8_t>(id >> 16)};
   std::copy(header.begin(), header.end(), out.begin());
   std::copy(payload.begin(), payload.begin() + static_cast<std::ptrdiff_t>(n), out.begin() + kHeaderV2);
   const std::uint16_t crc = crc_add(crc_add(kCrcInitial, out.subspan(1, kHeaderV2 - 1 + n)), crc_extra);

@@ -32,8 +32,8 @@ struct Frame {
   std::uint8_t system_id = 0, component_id = 0;  ///< of the sender, 1 ... 255
   std::uint32_t message_id = 0;
   const std::uint8_t* payload = nullptr;
-  std::size_t length = 0;  ///< bytes sent: 0 ... 255, may be below or above the message's own length
-  bool is_signed = false;  ///< carries a signature, which nobody has verified
+  std::size_t length = 0;                   ///< bytes sent: 0 ... 255, may be below or above the message's own length
+  bool is_signed = false;                   ///< carries a signature, which nobody has verified
   std::span<const std::uint8_t> signature;  ///< link id, 6 bytes of time, 6 bytes of hash; empty when unsigned
   std::span<const std::uint8_t> wire;       ///< the whole frame as received
 

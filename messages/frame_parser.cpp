@@ -5,6 +5,13 @@
 #include "messages/checksum.h"
 
 namespace wasp::mavlink {
+namespace {
+
+bool same_sender(const Frame& a, const Frame& b) noexcept {
+  return a.system_id == b.system_id && a.component_id == b.component_id;
+}
+
+}  // namespace
 
 std::size_t Parser::take(std::span<const std::uint8_t> bytes) noexcept {
   if (head_ > 0) {
@@ -93,6 +100,37 @@ Parser::Verdict Parser::refuse_header() noexcept {
   return Verdict::kNotAFrame;
 }
 
+bool Parser::checksum_holds(std::size_t at, const Claim& claim, std::uint8_t crc_extra) const noexcept {
+  const std::uint8_t* p = buffer_.data() + head_ + at;
+  const std::size_t end = claim.header + claim.frame.length;
+  const std::uint16_t crc = crc_add(crc_add(kCrcInitial, std::span(p + 1, end - 1)), crc_extra);
+  return crc == (p[end] | p[end + 1] << 8);
+}
+
+/// How many numbers `frame` is ahead of what its sender used last, `before` included; 0 for a sender not known.
+int Parser::steps_ahead(const Frame& frame, const Frame& before) noexcept {
+  if (same_sender(frame, before)) return static_cast<std::uint8_t>(frame.sequence - before.sequence);
+  const SourceCounts* source = sources_.find(frame.system_id, frame.component_id);
+  if (source == nullptr) return 0;
+  return static_cast<std::uint8_t>(frame.sequence - source->last_sequence - source->unverified_since_good);
+}
+
+/// True if a good frame inside the claim is not its payload but its neighbour, so that the claimed length is damaged:
+/// it ends exactly where the claim ends, or is the next of a sender of whom the frame behind the claim says nothing.
+bool Parser::swallows_a_frame(const Claim& claim, const Frame& follower) noexcept {
+  constexpr int kNear = 4;
+  for (std::size_t at = 1; at + kHeaderV1 + kChecksumBytes <= claim.total; ++at) {
+    const std::uint8_t start = buffer_[head_ + at];
+    Claim inner;
+    if ((start != kStartV1 && start != kStartV2) || !read_header(at, inner) || at + inner.total > claim.total) continue;
+    const int ahead = same_sender(inner.frame, follower) ? 0 : steps_ahead(inner.frame, claim.frame);
+    if (at + inner.total != claim.total && (ahead == 0 || ahead > kNear)) continue;
+    const MessageInfo* info = find_message(inner.frame.message_id);
+    if (info != nullptr && checksum_holds(at, inner, info->crc_extra)) return true;
+  }
+  return false;
+}
+
 /// A frame of unknown id or format. Where none was due it is noise; else it waits for what follows it.
 Parser::Verdict Parser::examine_unverifiable(const Claim& claim, std::uint64_t Counts::*total,
                                              std::uint64_t SourceCounts::*row) noexcept {
@@ -110,20 +148,15 @@ Parser::Verdict Parser::examine_unverifiable(const Claim& claim, std::uint64_t C
     ++source->unverified_since_good;
   }
   due_ = counted_until_ = offset_ + claim.total;
-  const Frame& f = follower.frame;
-  const bool same_sender = f.system_id == claim.frame.system_id && f.component_id == claim.frame.component_id;
-  const bool follows = plausible_first && (follower.incompat_flags & ~kIncompatSigned) == 0 &&
-                       (same_sender || sources_.find(f.system_id, f.component_id) != nullptr);
-  return follows ? Verdict::kPassOver : Verdict::kNotAFrame;
+  const bool follows = plausible_first && steps_ahead(follower.frame, claim.frame) == 1;
+  return follows && !swallows_a_frame(claim, follower.frame) ? Verdict::kPassOver : Verdict::kNotAFrame;
 }
 
 /// The whole frame is there: its checksum decides.
 Parser::Verdict Parser::check(Claim& claim, std::uint8_t crc_extra) noexcept {
   const std::span<const std::uint8_t> wire(buffer_.data() + head_, claim.total);
   Frame& f = claim.frame;
-  const std::size_t end = claim.header + f.length;
-  const std::uint16_t crc = crc_add(crc_add(kCrcInitial, wire.subspan(1, end - 1)), crc_extra);
-  if (crc != (wire[end] | wire[end + 1] << 8)) {
+  if (!checksum_holds(0, claim, crc_extra)) {
     if (offset_ < counted_until_) return Verdict::kNotAFrame;
     ++counts_.bad_crc;
     if (SourceCounts* source = sources_.find(f.system_id, f.component_id)) ++source->bad_crc;

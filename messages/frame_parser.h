@@ -1,7 +1,8 @@
-// Finds frames in a byte stream. A start byte is a claim; the header refutes most false ones at once (unknown id, source
-// 0, impossible version 1 length), the checksum the rest, and the search goes on at the byte after the failed start, so a
-// damaged frame never hides the good one behind it. A frame that cannot be verified (unknown id) is passed over whole only
-// if it stood where a frame was due and a plausible header follows it: frames carried inside its payload are not ours.
+// Finds frames in a byte stream. A start byte is a claim; the header refutes most false ones at once (unknown id,
+// source 0, impossible version 1 length), the checksum the rest, and the search goes on at the byte after the failed
+// start, so a damaged frame never hides the good one behind it. A frame that cannot be verified (unknown id) is passed
+// over whole only if it stood where a frame was due and the next header in sequence follows it: frames inside its
+// payload are not ours.
 #pragma once
 
 #include <array>
@@ -45,10 +46,14 @@ class Parser {
   std::size_t take(std::span<const std::uint8_t> bytes) noexcept;
   bool next(Frame& frame) noexcept;
   Verdict examine(Claim& claim) noexcept;
-  Verdict examine_unverifiable(const Claim& claim, std::uint64_t Counts::*total, std::uint64_t SourceCounts::*row) noexcept;
+  Verdict examine_unverifiable(const Claim& claim, std::uint64_t Counts::*total,
+                               std::uint64_t SourceCounts::*row) noexcept;
   Verdict refuse_header() noexcept;
   Verdict check(Claim& claim, std::uint8_t crc_extra) noexcept;
   bool read_header(std::size_t at, Claim& claim) const noexcept;
+  bool checksum_holds(std::size_t at, const Claim& claim, std::uint8_t crc_extra) const noexcept;
+  int steps_ahead(const Frame& frame, const Frame& before) noexcept;
+  bool swallows_a_frame(const Claim& claim, const Frame& follower) noexcept;
   void drop(std::size_t n) noexcept;
   [[nodiscard]] bool frame_is_due() const noexcept { return offset_ == due_; }
   [[nodiscard]] std::size_t available() const noexcept { return tail_ - head_; }

@@ -20,6 +20,7 @@ struct BehaviourWiring {
   DurationNs budget_ns = 0;
   StageTable* stages = nullptr;
   const BehaviourScript* script = nullptr;  ///< replay of a wasp recording: inputs as recorded, frames in order
+  std::uint32_t script_ends_at = 0;         ///< first frame sequence of the recording's second lap
   bool attitude_from_link = true;           ///< false in a replay: the simulated vehicle's attitude is not the camera's
   std::atomic<std::uint64_t>* frames_done = nullptr;  ///< replay flow control
 };
@@ -70,7 +71,7 @@ class BehaviourLoop {
     input.depth = frame.depth;
     if (wiring_.script != nullptr) {
       const ScriptedStep* step = find_step(*wiring_.script, frame.header.sequence);
-      if (step == nullptr) return frame.header.sequence > wiring_.script->back().frame_sequence;  // a later lap: no attitude
+      if (step == nullptr) return frame.header.sequence >= wiring_.script_ends_at;  // a later lap: no attitude
       input.exposed_at_ns = step->exposed_at_ns;  // the recording's own time: what the first step was given
       input.attitude_valid = step->attitude_valid;
       input.attitude = step->attitude;

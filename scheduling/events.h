@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cstring>
 #include <string_view>
 
@@ -27,6 +28,12 @@ class EventQueue {
     std::memcpy(e.text.data(), head.data(), n);
     std::memcpy(e.text.data() + n, tail.data(), std::min(tail.size(), e.text.size() - 1 - n));
     if (!queue_.push(e)) ++dropped_;
+  }
+  /// With a number behind the text. Realtime-safe: yes.
+  void say(TimeNs at_ns, std::string_view head, long number) WASP_REALTIME {
+    std::array<char, 24> digits;
+    const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), number).ptr;
+    say(at_ns, head, std::string_view(digits.data(), static_cast<std::size_t>(end - digits.data())));
   }
   bool take(Event& e) noexcept { return queue_.pop(e); }
   [[nodiscard]] std::uint64_t dropped() const noexcept { return dropped_; }

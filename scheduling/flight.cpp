@@ -91,6 +91,7 @@ class Flight {
     for (const auto& problem : recording.problems()) log("recording: " + problem);
     config_.camera = recording.geometry();
     scripts_ = load_replay_script(options_.replay);
+    second_lap_ = ReplayCamera::lap_sequence(recording);
     const double seconds = options_.seconds > 0 ? options_.seconds : to_seconds(ReplayCamera::lap_ns(recording));
     config_.control.mission.follow_recording = true;
     config_.control.mission.recording_seconds = static_cast<float>(seconds);
@@ -110,7 +111,10 @@ class Flight {
       if (replay_) {
         w.attitude_from_link = false;
         w.frames_done = replay_->add_reader(row.stream == Stream::kDepth);
-        if (const auto script = scripts_.find(row.name); script != scripts_.end()) w.script = &script->second;
+        if (const auto script = scripts_.find(row.name); script != scripts_.end()) {
+          w.script = &script->second;
+          w.script_ends_at = second_lap_;
+        }
       }
       bodies_.push_back(row.make(config_.camera, w));
     }
@@ -191,6 +195,7 @@ class Flight {
   drivers::AutopilotLink autopilot_;
   std::unique_ptr<shm::Region> camera_;
   std::map<std::string, BehaviourScript> scripts_;
+  std::uint32_t second_lap_ = 0;
   std::unique_ptr<ReplayCamera> replay_;
   std::unique_ptr<rt::CpuLatencyHold> latency_hold_;
   rt::Seqlock<LinkReport> report_;

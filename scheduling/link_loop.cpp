@@ -77,8 +77,9 @@ void LinkLoop::on_heartbeat(const drivers::AutopilotStatus& status) WASP_REALTIM
   now_.custom_mode = status.custom_mode;
 }
 
-void LinkLoop::on_ack(std::uint16_t, std::uint8_t result) WASP_REALTIME {
-  if (result != 0) events_.say(received_at_ns_, "autopilot refused a command");
+void LinkLoop::on_ack(std::uint16_t command, std::uint8_t result) WASP_REALTIME {
+  if (result == 1) events_.say(received_at_ns_, "autopilot not yet ready for command ", static_cast<long>(command));
+  if (result > 1) events_.say(received_at_ns_, "autopilot refused command ", static_cast<long>(command));
 }
 
 void LinkLoop::on_statustext(std::uint8_t, std::string_view text) WASP_REALTIME { events_.say(received_at_ns_, "autopilot: ", text); }

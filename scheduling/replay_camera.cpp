@@ -73,7 +73,6 @@ DurationNs ReplayCamera::lap_ns(const drivers::Recording& recording) {
 
 void ReplayCamera::decode(LoopControl& control) {
   const auto& entries = recording_.entries();
-  const std::uint32_t lap_sequence = entries.back().sequence + 1;
   std::uint32_t slot = 0;
   bool holding = false, any = true;
   for (std::uint32_t lap = 0; any && !control.stop; ++lap) {
@@ -85,7 +84,7 @@ void ReplayCamera::decode(LoopControl& control) {
         return;
       }
       while (!holding && !(holding = pool_.take_empty(slot)) && !control.stop) rt::sleep_until(rt::now() + 2 * kMillisecond);
-      if (!holding || !decode_one(i, offset_ns, lap * lap_sequence + entries[i].sequence, pool_.frame(slot))) continue;
+      if (!holding || !decode_one(i, offset_ns, lap * lap_sequence(recording_) + entries[i].sequence, pool_.frame(slot))) continue;
       pool_.give_full(slot);
       holding = false;
       any = true;

@@ -28,6 +28,9 @@ class ReplayCamera {
   /// Length of one pass over the recording.
   static DurationNs lap_ns(const drivers::Recording& recording);
 
+  /// Frame sequence at which the second pass starts.
+  static std::uint32_t lap_sequence(const drivers::Recording& recording) { return recording.entries().back().sequence + 1; }
+
   /// A behaviour that must not lose frames: number of its stream's newest frame it has finished with.
   std::atomic<std::uint64_t>* add_reader(bool depth);
 

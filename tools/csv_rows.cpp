@@ -36,8 +36,9 @@ class Line {
 
 constexpr std::array<std::string_view, 5> kModes = {"disarmed", "hold", "behaviour", "manual", "failsafe"};
 constexpr std::array<std::string_view, 15> kReasons = {
-    "none",      "start",   "mission_step", "cue_lost", "cue_back",   "attitude_lost",  "attitude_back",
-    "link_lost", "link_back", "pilot",      "not_finite", "autopilot_left", "deadline_missed", "stop_requested", "landed"};
+    "none",          "start",          "mission_step",    "cue_lost",       "cue_back",
+    "attitude_lost", "attitude_back",  "link_lost",       "link_back",      "pilot",
+    "not_finite",    "autopilot_left", "deadline_missed", "stop_requested", "landed"};
 static_assert(static_cast<std::size_t>(ModeReason::kLanded) + 1 == kReasons.size());
 static_assert(static_cast<std::size_t>(FlightMode::kFailsafe) + 1 == kModes.size());
 
@@ -53,7 +54,8 @@ std::string_view attitude_columns() {
          "number,published_at_ns";
 }
 std::string_view cue_columns() {
-  return "exposed_at_ns,released_at_ns,started_at_ns,finished_at_ns,behaviour,behaviour_index,frame_sequence,step_index,"
+  return "exposed_at_ns,released_at_ns,started_at_ns,finished_at_ns,behaviour,behaviour_index,frame_sequence,step_"
+         "index,"
          "over_budget,attitude_valid,q_w,q_x,q_y,q_z,rate_x_body_radps,rate_y_body_radps,rate_z_body_radps,"
          "validity,has_height,has_heading_rate,has_pitch,avoid,quality,height_m,height_sigma_m,heading_rate_radps,"
          "pitch_rad,detail_0,detail_1,detail_2,detail_3,detail_4,detail_5,detail_6,detail_7,number,published_at_ns";

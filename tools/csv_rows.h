@@ -1,6 +1,6 @@
 // One CSV line per message, every field of it, units in the column names. Floats carry nine significant digits, so that
-// reading them back gives the same bits (NaN excepted: its payload is not kept). The last two columns of every file are the
-// message's number in its ring and the instant it was published.
+// reading them back gives the same bits (NaN excepted: its payload is not kept). The last two columns of every file are
+// the message's number in its ring and the instant it was published.
 #pragma once
 
 #include <iterator>

@@ -1,5 +1,5 @@
-// A CSV file read back: column names from the first line, fields by name. A last line without a newline (a writer killed
-// in the middle) is dropped and said so; a line with the wrong number of fields is skipped and counted.
+// A CSV file read back: column names from the first line, fields by name. A last line without a newline (a writer
+// killed in the middle) is dropped and said so; a line with the wrong number of fields is skipped and counted.
 #pragma once
 
 #include <cstdint>

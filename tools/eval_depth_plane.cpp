@@ -40,8 +40,8 @@ vision::GravityPrior prior_of(const drivers::Recording& recording) {
 
 std::vector<Figure> figures_of(const Tally& tally, bool has_truth) {
   std::vector<Figure> figures{{"frames", tally.frames, ""}};
-  figures.push_back({"detection_rate", tally.found / tally.frames, "",
-                     has_truth ? std::optional(kDetection) : std::nullopt});
+  figures.push_back(
+      {"detection_rate", tally.found / tally.frames, "", has_truth ? std::optional(kDetection) : std::nullopt});
   add_spread(figures, "residual_rms", "mm", tally.rms_mm);
   if (has_truth) {
     add_spread(figures, "height_error", "cm", tally.height_cm, kHeightError_cm);

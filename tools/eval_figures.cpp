@@ -72,7 +72,8 @@ bool print(const std::vector<Figure>& figures, bool json) {
       continue;
     }
     const std::string bar =
-        f.bar ? fmt::format("  {} {:g}  {}", f.bar->at_least ? ">=" : "<=", f.bar->value, f.ok() ? "ok" : "NOT MET") : "";
+        f.bar ? fmt::format("  {} {:g}  {}", f.bar->at_least ? ">=" : "<=", f.bar->value, f.ok() ? "ok" : "NOT MET")
+              : "";
     fmt::print("{:<28}{:>12.4f} {:<6}{}\n", f.name, f.value, f.unit, bar);
   }
   return std::all_of(figures.begin(), figures.end(), [](const Figure& f) { return f.ok(); });

@@ -20,7 +20,8 @@ std::string kernel_help() {
 }
 
 std::string check_kernel(const std::string& name) {
-  const bool known = std::any_of(kEvalKernels.begin(), kEvalKernels.end(), [&](const auto& k) { return k.name == name; });
+  const bool known =
+      std::any_of(kEvalKernels.begin(), kEvalKernels.end(), [&](const auto& k) { return k.name == name; });
   return known ? "" : fmt::format("unknown kernel '{}'\n{}", name, kernel_help());
 }
 
@@ -48,7 +49,9 @@ int main(int argc, char** argv) {
   app.add_option("KERNEL", kernel, "what to run (see below)")->required()->check(check_kernel);
   app.add_option("DIR", folder, "folder of the recording")->required();
   app.add_flag("--json", json, "one JSON object a figure and line");
-  app.add_option("--repeat", options.repeat, "passes over the recording")->check(CLI::Range(1, 100000))->capture_default_str();
+  app.add_option("--repeat", options.repeat, "passes over the recording")
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str();
   app.add_flag("--cold", options.cold, "forget the previous frame before each one");
   CLI11_PARSE(app, argc, argv);
   try {

@@ -56,7 +56,9 @@ float number(const Row& row, const std::string& column, const std::filesystem::p
 
 PlaneTruth plane_of(const Row& row, const std::filesystem::path& file) {
   const bool fit = row.contains("fit_nx");
-  const std::string prefix = fit ? "fit_" : "", height = fit ? "fit_height_m" : row.contains("camera_height_m") ? "camera_height_m" : "height_m";
+  const std::string prefix = fit ? "fit_" : "", height = fit                               ? "fit_height_m"
+                                                         : row.contains("camera_height_m") ? "camera_height_m"
+                                                                                           : "height_m";
   return {Vec3(number(row, prefix + "nx", file), number(row, prefix + "ny", file), number(row, prefix + "nz", file))
               .normalized(),
           number(row, height, file)};

@@ -36,8 +36,8 @@ std::string text_of(const std::array<char, 32>& text) {
 }
 
 nlohmann::json stage_json(const StageSummary& s, bool with_buckets) {
-  nlohmann::json row = {{"owner", s.owner},     {"stage", s.stage},   {"count", s.count},   {"min_ns", s.min_ns},
-                        {"mean_ns", s.mean_ns}, {"p50_ns", s.p50_ns}, {"p90_ns", s.p90_ns}, {"p99_ns", s.p99_ns},
+  nlohmann::json row = {{"owner", s.owner},     {"stage", s.stage},   {"count", s.count},         {"min_ns", s.min_ns},
+                        {"mean_ns", s.mean_ns}, {"p50_ns", s.p50_ns}, {"p90_ns", s.p90_ns},       {"p99_ns", s.p99_ns},
                         {"p999_ns", s.p999_ns}, {"max_ns", s.max_ns}, {"budget_ns", s.budget_ns}, {"misses", s.misses}};
   if (with_buckets) row["buckets"] = s.buckets;
   return row;
@@ -98,13 +98,20 @@ RunSummary read_run(const shm::Region& flight) {
 
 nlohmann::json run_json(const RunSummary& s) {
   if (!s.present) return nullptr;
-  return {{"real_time", s.real_time},       {"preempt_rt", s.preempt_rt},
-          {"armed", s.armed},               {"finished", s.finished},
-          {"ticks", s.ticks},               {"skipped", s.skipped},
-          {"deadline_misses", s.deadline_misses}, {"minor_faults", s.minor_faults},
-          {"major_faults", s.major_faults}, {"frames_lost", s.frames_lost},
-          {"bad_frames", s.bad_frames},     {"link_reconnects", s.link_reconnects},
-          {"mission_result", s.mission_result},   {"behaviours", s.behaviours}};
+  return {{"real_time", s.real_time},
+          {"preempt_rt", s.preempt_rt},
+          {"armed", s.armed},
+          {"finished", s.finished},
+          {"ticks", s.ticks},
+          {"skipped", s.skipped},
+          {"deadline_misses", s.deadline_misses},
+          {"minor_faults", s.minor_faults},
+          {"major_faults", s.major_faults},
+          {"frames_lost", s.frames_lost},
+          {"bad_frames", s.bad_frames},
+          {"link_reconnects", s.link_reconnects},
+          {"mission_result", s.mission_result},
+          {"behaviours", s.behaviours}};
 }
 
 nlohmann::json latency_json(const std::vector<StageSummary>& stages, const RunSummary& run, bool with_buckets) {

@@ -37,7 +37,8 @@ struct RunSummary {
 template <class T>
 const T* find_block(const shm::Region& region, std::string_view topic, std::string_view type) {
   for (const auto& e : region.topics())
-    if (e.name_view() == topic && e.type_view() == type && e.kind == shm::TopicKind::kBlock && sizeof(T) <= e.payload_bytes)
+    if (e.name_view() == topic && e.type_view() == type && e.kind == shm::TopicKind::kBlock &&
+        sizeof(T) <= e.payload_bytes)
       return reinterpret_cast<const T*>(region.at(e.offset));
   return nullptr;
 }

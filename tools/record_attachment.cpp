@@ -81,7 +81,8 @@ std::vector<std::string> list_instances() {
   for (const std::string& region : shm::Region::list("wasp.")) {
     const std::size_t dot = region.rfind('.');
     const std::string_view tail = std::string_view(region).substr(dot);
-    if (dot > 5 && (tail == ".flight" || tail == ".camera" || tail == ".truth")) names.push_back(region.substr(5, dot - 5));
+    if (dot > 5 && (tail == ".flight" || tail == ".camera" || tail == ".truth"))
+      names.push_back(region.substr(5, dot - 5));
   }
   std::sort(names.begin(), names.end());
   names.erase(std::unique(names.begin(), names.end()), names.end());

@@ -23,8 +23,10 @@ void replace_file(const std::filesystem::path& path, const std::string& content)
     ok = static_cast<bool>(out << content << std::flush);
   }
   std::error_code error;
-  if (ok) std::filesystem::rename(beside, path, error);
-  else std::filesystem::remove(beside, error);
+  if (ok)
+    std::filesystem::rename(beside, path, error);
+  else
+    std::filesystem::remove(beside, error);
 }
 
 std::string text_of(const nlohmann::json& document, int indent) {
@@ -60,12 +62,13 @@ void RecordSession::write_camera_toml() const {
   const double scale = static_cast<double>(frame_size_->width_px) / usual.width_px;
   const auto focal = [scale](float f) { return static_cast<double>(f) * scale; };
   const auto centre = [scale](float c) { return (static_cast<double>(c) + 0.5) * scale - 0.5; };
-  replace_file(options_.directory / "recording" / "camera.toml",
-               fmt::format("# Size from the frames; the rest is the usual Kinect geometry, not measured.\n"
-                           "width_px = {}\nheight_px = {}\nfx_px = {:.6f}\nfy_px = {:.6f}\ncx_px = {:.6f}\ncy_px = {:.6f}\n"
-                           "pitch_down_deg = 0.0\ndepth_units_per_m = 1000\nposition_body_m = [0.0, 0.0, 0.0]\n",
-                           frame_size_->width_px, frame_size_->height_px, focal(usual.fx_px), focal(usual.fy_px),
-                           centre(usual.cx_px), centre(usual.cy_px)));
+  replace_file(
+      options_.directory / "recording" / "camera.toml",
+      fmt::format("# Size from the frames; the rest is the usual Kinect geometry, not measured.\n"
+                  "width_px = {}\nheight_px = {}\nfx_px = {:.6f}\nfy_px = {:.6f}\ncx_px = {:.6f}\ncy_px = {:.6f}\n"
+                  "pitch_down_deg = 0.0\ndepth_units_per_m = 1000\nposition_body_m = [0.0, 0.0, 0.0]\n",
+                  frame_size_->width_px, frame_size_->height_px, focal(usual.fx_px), focal(usual.fy_px),
+                  centre(usual.cx_px), centre(usual.cy_px)));
 }
 
 void RecordSession::write_stages() const {
@@ -78,15 +81,27 @@ void RecordSession::write_account(const std::string& reason) const {
   for (const auto& [key, c] : counts_) {
     std::uint64_t failed = 0;
     if (pool_ && c.type == "Frame") failed = pool_->failed(c.topic == "depth" ? *depth_ : *rgb_);
-    topics.push_back({{"region", c.region}, {"topic", c.topic}, {"type", c.type}, {"recorded", c.taken}, {"lost", c.lost},
-                      {"before_attach", c.before_attach}, {"rejected", c.rejected}, {"refused_by_disk", failed},
-                      {"polls_with_queue_full", c.queue_full}, {"kept", c.type != "Frame" || options_.frames}});
+    topics.push_back({{"region", c.region},
+                      {"topic", c.topic},
+                      {"type", c.type},
+                      {"recorded", c.taken},
+                      {"lost", c.lost},
+                      {"before_attach", c.before_attach},
+                      {"rejected", c.rejected},
+                      {"refused_by_disk", failed},
+                      {"polls_with_queue_full", c.queue_full},
+                      {"kept", c.type != "Frame" || options_.frames}});
   }
   for (const auto& e : events_) events.push_back({{"at_ns", e.at_ns}, {"region", e.region}, {"what", e.what}});
-  replace_file(log("record.json"), text_of({{"instance", options_.instance}, {"started_at_ns", started_at_ns_},
-                                            {"ended_at_ns", rt::now()}, {"reason", reason}, {"topics", topics},
-                                            {"lines_refused_by_disk", refused_lines()}, {"events", events},
-                                            {"events_dropped", events_dropped_}}, 2));
+  replace_file(log("record.json"), text_of({{"instance", options_.instance},
+                                            {"started_at_ns", started_at_ns_},
+                                            {"ended_at_ns", rt::now()},
+                                            {"reason", reason},
+                                            {"topics", topics},
+                                            {"lines_refused_by_disk", refused_lines()},
+                                            {"events", events},
+                                            {"events_dropped", events_dropped_}},
+                                           2));
 }
 
 }  // namespace wasp::tools

@@ -47,8 +47,10 @@ bool FrameFollower::drain() {
     }
     const std::uint64_t lost = reader_.lost();
     const shm::Sample sample = reader_.next();
-    if (sample) take(sample);
-    else if (reader_.lost() == lost) break;
+    if (sample)
+      take(sample);
+    else if (reader_.lost() == lost)
+      break;
   }
   count_.lost += reader_.lost() - lost_before;
   return waiting;

@@ -1,6 +1,6 @@
-// Follows one frame ring: copies each frame out, checks afterwards that the writer did not touch it meanwhile, and hands
-// it to the image writers. While their queue is full, frames wait in the ring; what is overwritten there is lost and
-// counted.
+// Follows one frame ring: copies each frame out, checks afterwards that the writer did not touch it meanwhile, and
+// hands it to the image writers. While their queue is full, frames wait in the ring; what is overwritten there is lost
+// and counted.
 #pragma once
 
 #include <optional>

@@ -1,5 +1,5 @@
-// Two threads that turn frames into PNG files, fed by a bounded queue. The index line of a frame ("<seconds> <file>", TUM
-// RGB-D layout) is written after its file is whole, in the order the frames were taken: a killed recorder leaves an
+// Two threads that turn frames into PNG files, fed by a bounded queue. The index line of a frame ("<seconds> <file>",
+// TUM RGB-D layout) is written after its file is whole, in the order the frames were taken: a killed recorder leaves an
 // index that names whole files only.
 #pragma once
 

@@ -37,7 +37,8 @@ void report_losses(const wasp::tools::RecordSession& session) {
 int main(int argc, char** argv) {
   wasp::tools::RecordOptions options;
   double poll_ms = 2.0;
-  CLI::App app{"Records a flight from shared memory, read-only. Ends on SIGTERM, SIGINT, or when the flight has finished."};
+  CLI::App app{
+      "Records a flight from shared memory, read-only. Ends on SIGTERM, SIGINT, or when the flight has finished."};
   app.name("wasp-record");
   app.add_option("--instance", options.instance, "Instance to follow: the X of wasp.X.flight")->required();
   app.add_option("--out", options.directory, "Folder for log/ and recording/")->required();

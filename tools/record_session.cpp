@@ -12,8 +12,9 @@ namespace {
 
 constexpr DurationNs kFlushPeriod = 200 * kMillisecond;
 constexpr DurationNs kSnapshotPeriod = kSecond;
-constexpr DurationNs kEndGrace = 300 * kMillisecond;  // what the simulator and the camera still publish after the flight
-constexpr DurationNs kDrainLimit = 10 * kSecond;      // for frames that wait for the image writers
+constexpr DurationNs kEndGrace =
+    300 * kMillisecond;                           // what the simulator and the camera still publish after the flight
+constexpr DurationNs kDrainLimit = 10 * kSecond;  // for frames that wait for the image writers
 constexpr std::size_t kMaxEvents = 1000;
 
 template <class T>
@@ -103,9 +104,10 @@ void RecordSession::follow(Source& source, TopicCount& count, Start start) {
   else if (count.type == "Truth")
     drains.push_back(table_drain<Truth>(region, start, t.truth, count, plain_row<Truth>));
   else if (count.type == "Cue")
-    drains.push_back(table_drain<Cue>(region, start, t.cues, count,
-                                      [name = count.topic.substr(count.topic.find('.') + 1)](
-                                          const Cue& cue, const RingStamp& stamp) { return csv_row(cue, stamp, name); }));
+    drains.push_back(
+        table_drain<Cue>(region, start, t.cues, count,
+                         [name = count.topic.substr(count.topic.find('.') + 1)](
+                             const Cue& cue, const RingStamp& stamp) { return csv_row(cue, stamp, name); }));
   else if (count.type == "Frame")
     follow_frames(source, count, start);
   else
@@ -141,7 +143,8 @@ void RecordSession::take_snapshot(const Source& source) {
 }
 
 void RecordSession::let_go(Source& source) {
-  for (const TimeNs limit = rt::now() + kDrainLimit; drain(source) && rt::now() < limit;) rt::sleep_until(rt::now() + options_.poll_period_ns);
+  for (const TimeNs limit = rt::now() + kDrainLimit; drain(source) && rt::now() < limit;)
+    rt::sleep_until(rt::now() + options_.poll_period_ns);
   if (&source == &sources_.front()) take_snapshot(source);
   source.drains.clear();
   source.attachment.detach();

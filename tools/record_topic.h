@@ -56,8 +56,10 @@ class TopicFollower {
     for (std::uint32_t i = 0; i < 2 * reader_.slots(); ++i) {
       const std::uint64_t lost = reader_.lost();
       const shm::Sample sample = reader_.next();
-      if (sample) take(sample);
-      else if (reader_.lost() == lost) break;
+      if (sample)
+        take(sample);
+      else if (reader_.lost() == lost)
+        break;
     }
     count_.lost += reader_.lost() - lost_before;
   }

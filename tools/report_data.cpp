@@ -22,9 +22,12 @@ nlohmann::json read_json(ReportData& data, const char* name) {
 
 std::optional<CsvTable> read_table(ReportData& data, const char* name) {
   auto table = CsvTable::read(data.directory / name);
-  if (!table) data.remarks.push_back(fmt::format("{} is missing.", name));
-  else if (table->rows() == 0) data.remarks.push_back(fmt::format("{} holds no rows.", name));
-  if (table && table->bad_lines() > 0) data.remarks.push_back(fmt::format("{}: {} lines could not be read.", name, table->bad_lines()));
+  if (!table)
+    data.remarks.push_back(fmt::format("{} is missing.", name));
+  else if (table->rows() == 0)
+    data.remarks.push_back(fmt::format("{} holds no rows.", name));
+  if (table && table->bad_lines() > 0)
+    data.remarks.push_back(fmt::format("{}: {} lines could not be read.", name, table->bad_lines()));
   if (table && table->cut()) data.remarks.push_back(fmt::format("{} ends in the middle of a line.", name));
   return table;
 }
@@ -37,10 +40,13 @@ std::int64_t first(const std::optional<CsvTable>& table, const char* column) {
 void remark_losses(ReportData& data) {
   if (!data.record.contains("topics") || !data.record["topics"].is_array()) return;
   for (const auto& t : data.record["topics"]) {
-    const auto number = [&t](const char* key) { return t.contains(key) && t[key].is_number() ? t[key].get<double>() : 0.0; };
+    const auto number = [&t](const char* key) {
+      return t.contains(key) && t[key].is_number() ? t[key].get<double>() : 0.0;
+    };
     const double lost = number("lost") + number("rejected") + number("refused_by_disk");
     if (lost > 0 && !(t.contains("kept") && t["kept"] == false))
-      data.remarks.push_back(fmt::format("The recorder lost {:.0f} of {:.0f} messages of topic {}.", lost, lost + number("recorded"), text_at(t, "topic")));
+      data.remarks.push_back(fmt::format("The recorder lost {:.0f} of {:.0f} messages of topic {}.", lost,
+                                         lost + number("recorded"), text_at(t, "topic")));
   }
 }
 

@@ -18,13 +18,24 @@ constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kDegrees = 180.0 / 3.14159265358979323846;
 
 /// One column against one column of instants.
-Series column_series(const ReportData& data, const std::optional<CsvTable>& table, const char* time, const char* value) {
+Series column_series(const ReportData& data, const std::optional<CsvTable>& table, const char* time,
+                     const char* value) {
   Series s;
   if (!table) return s;
   const auto t = table->integers(time);
   s.y = table->numbers(value);
   for (const auto instant : t) s.x.push_back(data.seconds(instant));
   return s;
+}
+
+/// A value that holds until the next one: upright steps instead of slopes.
+Series as_steps(const Series& series) {
+  Series steps;
+  for (std::size_t i = 0; i < series.size(); ++i) {
+    if (i > 0 && series.y[i] != series.y[i - 1]) steps.add(series.x[i], series.y[i - 1]);
+    steps.add(series.x[i], series.y[i]);
+  }
+  return steps;
 }
 
 void add_curve(Plot& plot, std::string name, CurveStyle style, const Series& series, std::size_t slices) {
@@ -36,7 +47,8 @@ void add_curve(Plot& plot, std::string name, CurveStyle style, const Series& ser
 Series cue_heights(const ReportData& data, const std::string& behaviour) {
   Series s;
   const auto names = data.cues->texts("behaviour");
-  const auto t = data.cues->integers("exposed_at_ns"), valid = data.cues->integers("validity"), has = data.cues->integers("has_height");
+  const auto t = data.cues->integers("exposed_at_ns"), valid = data.cues->integers("validity"),
+             has = data.cues->integers("has_height");
   const auto height = data.cues->numbers("height_m");
   for (std::size_t i = 0; i < names.size(); ++i)
     if (names[i] == behaviour) s.add(data.seconds(t[i]), valid[i] != 0 && has[i] != 0 ? height[i] : kNan);
@@ -86,7 +98,8 @@ Series angle_series(const ReportData& data, const std::optional<CsvTable>& table
   if (!table) return s;
   const auto x = table->numbers("q_x"), y = table->numbers("q_y"), z = table->numbers("q_z");
   for (std::size_t i = 0; i < s.size(); ++i) {
-    const Quat q(static_cast<float>(s.y[i]), static_cast<float>(x[i]), static_cast<float>(y[i]), static_cast<float>(z[i]));
+    const Quat q(static_cast<float>(s.y[i]), static_cast<float>(x[i]), static_cast<float>(y[i]),
+                 static_cast<float>(z[i]));
     const Euler e = euler_from_quat(q);
     s.y[i] = kDegrees * static_cast<double>(angle == Angle::kRoll ? e.roll_rad : e.pitch_rad);
   }
@@ -117,9 +130,11 @@ std::string altitude_figure(const ReportData& data) {
   int colour = 0;
   for (const auto& name : height_behaviours(data))
     add_curve(plot, name, {fmt::format("c{}", colour++ % 6), "thin soft"}, cue_heights(data, name), kWideSlices);
-  add_curve(plot, "control's estimate", {"c4", "thin"}, column_series(data, data.commands, "due_at_ns", "height_m"), kWideSlices);
+  add_curve(plot, "control's estimate", {"c4", "thin"}, column_series(data, data.commands, "due_at_ns", "height_m"),
+            kWideSlices);
   add_curve(plot, "truth", {"ink", "thick"}, column_series(data, data.truth, "exposed_at_ns", "height_m"), kWideSlices);
-  add_curve(plot, "setpoint", {"c3", "thick dashed"}, column_series(data, data.commands, "due_at_ns", "height_setpoint_m"), kWideSlices);
+  add_curve(plot, "setpoint", {"c3", "thick dashed"},
+            as_steps(column_series(data, data.commands, "due_at_ns", "height_setpoint_m")), kWideSlices);
   return svg_or_nothing(plot);
 }
 
@@ -129,7 +144,8 @@ std::string height_error_figure(const ReportData& data) {
   const Series truth = column_series(data, data.truth, "exposed_at_ns", "height_m");
   int colour = 0;
   for (const auto& name : height_behaviours(data))
-    add_curve(plot, name, {fmt::format("c{}", colour++ % 6), "thin"}, minus_truth(cue_heights(data, name), truth), kNarrowSlices);
+    add_curve(plot, name, {fmt::format("c{}", colour++ % 6), "thin"}, minus_truth(cue_heights(data, name), truth),
+              kNarrowSlices);
   const Series estimate = column_series(data, data.commands, "due_at_ns", "height_m");
   add_curve(plot, "control's estimate", {"c4", "thin"}, minus_truth(estimate, truth), kNarrowSlices);
   return svg_or_nothing(plot);
@@ -150,10 +166,14 @@ std::string path_figure(const ReportData& data) {
 std::string attitude_figure(const ReportData& data) {
   Plot plot = narrow_plot("Roll and pitch over time", "time [s]", "angle [deg]");
   plot.least_y_span = 1;
-  add_curve(plot, "roll commanded", {"c0", "thin soft"}, angle_series(data, data.commands, "due_at_ns", Angle::kRoll), kNarrowSlices);
-  add_curve(plot, "roll", {"c0", "medium"}, angle_series(data, data.attitude, "exposed_at_ns", Angle::kRoll), kNarrowSlices);
-  add_curve(plot, "pitch commanded", {"c1", "thin soft"}, angle_series(data, data.commands, "due_at_ns", Angle::kPitch), kNarrowSlices);
-  add_curve(plot, "pitch", {"c1", "medium"}, angle_series(data, data.attitude, "exposed_at_ns", Angle::kPitch), kNarrowSlices);
+  add_curve(plot, "roll commanded", {"c0", "thin soft"}, angle_series(data, data.commands, "due_at_ns", Angle::kRoll),
+            kNarrowSlices);
+  add_curve(plot, "roll", {"c0", "medium"}, angle_series(data, data.attitude, "exposed_at_ns", Angle::kRoll),
+            kNarrowSlices);
+  add_curve(plot, "pitch commanded", {"c1", "thin soft"}, angle_series(data, data.commands, "due_at_ns", Angle::kPitch),
+            kNarrowSlices);
+  add_curve(plot, "pitch", {"c1", "medium"}, angle_series(data, data.attitude, "exposed_at_ns", Angle::kPitch),
+            kNarrowSlices);
   return svg_or_nothing(plot);
 }
 

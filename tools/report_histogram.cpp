@@ -6,6 +6,8 @@
 #include <array>
 #include <cmath>
 #include <iterator>
+#include <utility>
+#include <vector>
 
 #include "tools/report_plot.h"
 
@@ -25,7 +27,8 @@ struct Axes {
   /// Counts start at 0.7 so that one sample shows.
   [[nodiscard]] double py(double count) const {
     const double base = std::log10(0.7);
-    return kHeight - kBottom - (std::log10(std::max(count, 0.7)) - base) / (log_top - base) * (kHeight - kTop - kBottom);
+    return kHeight - kBottom -
+           (std::log10(std::max(count, 0.7)) - base) / (log_top - base) * (kHeight - kTop - kBottom);
   }
 };
 
@@ -49,18 +52,20 @@ void draw_axes(const Axes& axes, Out out) {
   const double bottom = kHeight - kBottom;
   for (int d = static_cast<int>(axes.log_low); d <= static_cast<int>(axes.log_high); ++d) {
     const double x = axes.px(std::pow(10.0, d));
-    fmt::format_to(out, "<path class='grid' d='M{0:.1f} {1}V{2}'/><text class='mid' x='{0:.1f}' y='{3}'>{4}</text>", x, kTop, bottom,
-                   bottom + 16, decade_text(d));
+    fmt::format_to(out, "<path class='grid' d='M{0:.1f} {1}V{2}'/><text class='mid' x='{0:.1f}' y='{3}'>{4}</text>", x,
+                   kTop, bottom, bottom + 16, decade_text(d));
   }
   const int step = axes.log_top > 4 ? 2 : 1;
   for (int d = 0; d <= static_cast<int>(axes.log_top); d += step) {
     const double y = axes.py(std::pow(10.0, d));
-    fmt::format_to(out, "<path class='grid' d='M{0} {1:.1f}H{2}'/><text class='end' x='{3}' y='{4:.1f}'>{5:.0f}</text>", kLeft, y,
-                   kWidth - kRight, kLeft - 5, y + 4, std::pow(10.0, d));
+    fmt::format_to(out, "<path class='grid' d='M{0} {1:.1f}H{2}'/><text class='end' x='{3}' y='{4:.1f}'>{5:.0f}</text>",
+                   kLeft, y, kWidth - kRight, kLeft - 5, y + 4, std::pow(10.0, d));
   }
   fmt::format_to(out, "<path class='axis' d='M{0} {1}V{2}H{3}'/>", kLeft, kTop, bottom, kWidth - kRight);
-  fmt::format_to(out, "<text class='mid name' x='{}' y='{}'>duration (logarithmic)</text>", 0.5 * (kLeft + kWidth - kRight), kHeight - 5);
-  fmt::format_to(out, "<text class='mid name' transform='translate(10 {}) rotate(-90)'>samples</text>", 0.5 * (kTop + bottom));
+  fmt::format_to(out, "<text class='mid name' x='{}' y='{}'>duration (logarithmic)</text>",
+                 0.5 * (kLeft + kWidth - kRight), kHeight - 5);
+  fmt::format_to(out, "<text class='mid name' transform='translate(10 {}) rotate(-90)'>samples</text>",
+                 0.5 * (kTop + bottom));
 }
 
 void draw_bars(const StageSummary& stage, const Axes& axes, Out out) {
@@ -69,30 +74,52 @@ void draw_bars(const StageSummary& stage, const Axes& axes, Out out) {
   fmt::format_to(out, "<path class='bar' d='");
   for (std::size_t i = 0; i < kBars; ++i)
     if (bars[i] > 0)
-      fmt::format_to(out, "M{:.1f} {}V{:.1f}h{:.1f}V{}z", kLeft + static_cast<double>(i) * wide, kHeight - kBottom, axes.py(bars[i]),
-                     wide - 0.6, kHeight - kBottom);
+      fmt::format_to(out, "M{:.1f} {}V{:.1f}h{:.1f}V{}z", kLeft + static_cast<double>(i) * wide, kHeight - kBottom,
+                     axes.py(bars[i]), wide - 0.6, kHeight - kBottom);
   fmt::format_to(out, "'/>");
 }
 
-/// Marks left to right; a label that would touch the one before it goes one row up, of three.
-void draw_marks(const StageSummary& s, const Axes& axes, Out out) {
-  const std::array<std::pair<const char*, std::int64_t>, 4> marks = {
+struct QuantileMark {
+  std::string name;
+  double x;
+};
+
+/// p50, p99, p99.9 and max from left to right; those that fall together share a name.
+std::vector<QuantileMark> marks_of(const StageSummary& s, const Axes& axes) {
+  const std::array<std::pair<const char*, std::int64_t>, 4> all = {
       {{"p50", s.p50_ns}, {"p99", s.p99_ns}, {"p99.9", s.p999_ns}, {"max", s.max_ns}}};
+  std::vector<QuantileMark> marks;
+  for (const auto& [name, ns] : all) {
+    const double x = axes.px(static_cast<double>(ns));
+    if (!marks.empty() && x - marks.back().x < 3) {
+      marks.back().name.append(", ").append(name);
+      marks.back().x = x;
+    } else {
+      marks.push_back({name, x});
+    }
+  }
+  return marks;
+}
+
+/// A label that would touch the one before it goes one row up, of three.
+void draw_marks(const StageSummary& s, const Axes& axes, Out out) {
   std::array<double, 3> row_end = {-1e9, -1e9, -1e9};
-  for (const auto& [name, ns] : marks) {
-    const double x = axes.px(static_cast<double>(ns)), half = 0.5 * text_width(name);
-    const double centre = std::min(x, kWidth - half - 2);
+  for (const auto& [name, x] : marks_of(s, axes)) {
+    const double half = 0.5 * text_width(name);
+    const double centre = std::clamp(x, half + 2, kWidth - half - 2);
     std::size_t row = 0;
     while (row + 1 < row_end.size() && centre - half < row_end[row] + 3) ++row;
     row_end[row] = centre + half;
-    const double y = kTop - 3 - 13 * static_cast<double>(row);
-    fmt::format_to(out, "<path class='quantile' d='M{0:.1f} {1:.1f}V{2}'/><text class='mid' x='{3:.1f}' y='{1:.1f}'>{4}</text>", x, y,
-                   kHeight - kBottom, centre, name);
+    fmt::format_to(out, "<path class='quantile' d='M{:.1f} {}V{}'/><text class='mid' x='{:.1f}' y='{}'>{}</text>", x,
+                   kTop - 2, kHeight - kBottom, centre, kTop - 4 - 13 * static_cast<double>(row), name);
   }
   if (s.budget_ns <= 0) return;
   const double x = axes.px(static_cast<double>(s.budget_ns));
-  fmt::format_to(out, "<path class='budget' d='M{0:.1f} {1}V{2}'/><text class='budget-text {5}' x='{3:.1f}' y='{4}'>budget</text>", x,
-                 kTop, kHeight - kBottom, x > kWidth - 70 ? x - 4 : x + 4, kTop + 12, x > kWidth - 70 ? "end" : "");
+  const bool left = x > kWidth - 70;
+  fmt::format_to(
+      out,
+      "<path class='budget' d='M{0:.1f} {1}V{2}'/><text class='budget-text halo {5}' x='{3:.1f}' y='{4}'>budget</text>",
+      x, kTop, kHeight - kBottom, left ? x - 4 : x + 4, kTop + 12, left ? "end" : "");
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <iterator>
 
 #include "tools/report_figures.h"
@@ -21,7 +22,8 @@ const json& list_at(const json& object, const char* key) {
 
 /// nullopt where nothing was to be met.
 std::optional<bool> verdict(const json& result) {
-  const bool judged = result.is_object() && !text_at(result, "bar").empty() && result.contains("ok") && result["ok"].is_boolean();
+  const bool judged =
+      result.is_object() && !text_at(result, "bar").empty() && result.contains("ok") && result["ok"].is_boolean();
   return judged ? std::optional<bool>(result["ok"].get<bool>()) : std::nullopt;
 }
 
@@ -40,34 +42,37 @@ void heading(const ReportData& data, Out out) {
   if (name.empty()) name = std::filesystem::absolute(data.directory).lexically_normal().filename().string();
   const Outcome outcome = outcome_of(data);
   fmt::format_to(out, "<h1>Flight {}</h1>\n", escape_html(name));
-  fmt::format_to(out, "<p class='outcome {}'>{}</p>\n", !outcome.good ? "" : *outcome.good ? "good" : "bad", escape_html(outcome.text));
+  fmt::format_to(out, "<p class='outcome {}'>{}</p>\n",
+                 !outcome.good   ? ""
+                 : *outcome.good ? "good"
+                                 : "bad",
+                 escape_html(outcome.text));
   const std::string note = text_at(data.run, "mode_note");
   const auto is_real_time = real_time(data);
   if (is_real_time && !*is_real_time)
-    fmt::format_to(out, "<p class='banner'>NOT REAL TIME{}. Every latency below was measured without real-time scheduling.</p>\n",
-                   note.empty() ? "" : ": " + escape_html(note));
-  if (!is_real_time) fmt::format_to(out, "<p class='banner'>It is not recorded whether this flight was real time.</p>\n");
-}
-
-void fact(const char* name, const std::string& value, Out out) {
-  if (!value.empty()) fmt::format_to(out, "<dt>{}</dt><dd>{}</dd>", name, escape_html(value));
+    fmt::format_to(
+        out, "<p class='banner'>NOT REAL TIME{}. Every latency below was measured without real-time scheduling.</p>\n",
+        note.empty() ? "" : ": " + escape_html(note));
+  if (!is_real_time)
+    fmt::format_to(out, "<p class='banner'>It is not recorded whether this flight was real time.</p>\n");
 }
 
 void facts(const ReportData& data, Out out) {
-  const json& run = data.run;
-  fmt::format_to(out, "<div class='card'><dl>");
-  fact("Started", text_at(run, "started"), out);
-  fact("Mission", text_at(run, "mission"), out);
-  const std::string seconds = text_at(run, "seconds");
-  fact("Planned flight time", seconds.empty() ? "" : seconds + " s", out);
-  fact("Ended", text_at(run, "exit_reason"), out);
-  fact("Camera", text_at(run, "camera"), out);
-  fact("Seed", text_at(run, "seed"), out);
-  fact("Kernel", text_at(run, "kernel"), out);
-  fact("Scheduler", text_at(run, "scheduler"), out);
-  fact("Host", text_at(run, "host"), out);
-  fact("Command line", text_at(run, "command_line"), out);
-  fmt::format_to(out, "</dl></div>\n");
+  constexpr std::array<std::array<const char*, 2>, 10> kFacts = {{{"Started", "started"},
+                                                                  {"Mission", "mission"},
+                                                                  {"Planned flight time [s]", "seconds"},
+                                                                  {"Ended", "exit_reason"},
+                                                                  {"Camera", "camera"},
+                                                                  {"Seed", "seed"},
+                                                                  {"Kernel", "kernel"},
+                                                                  {"Scheduler", "scheduler"},
+                                                                  {"Host", "host"},
+                                                                  {"Command line", "command_line"}}};
+  std::string rows;
+  for (const auto& [name, key] : kFacts)
+    if (const std::string value = text_at(data.run, key); !value.empty())
+      rows += fmt::format("<dt>{}</dt><dd>{}</dd>", name, escape_html(value));
+  if (!rows.empty()) fmt::format_to(out, "<div class='card'><dl>{}</dl></div>\n", rows);
 }
 
 void remarks(const ReportData& data, Out out) {
@@ -81,8 +86,13 @@ void result_row(const json& r, Out out) {
   const auto met = verdict(r);
   fmt::format_to(out, "<tr><td>{}</td><td class='n'>{} {}</td><td class='n'>{}</td><td class='state {}'>{}</td></tr>\n",
                  escape_html(text_at(r, "name")), escape_html(text_at(r, "value")), escape_html(text_at(r, "unit")),
-                 escape_html(text_at(r, "bar")), !met ? "soft" : *met ? "good" : "bad",
-                 !met ? "no bar" : *met ? "&#10003; met" : "&#10007; missed");
+                 escape_html(text_at(r, "bar")),
+                 !met   ? "soft"
+                 : *met ? "good"
+                        : "bad",
+                 !met   ? "no bar"
+                 : *met ? "&#10003; met"
+                        : "&#10007; missed");
 }
 
 void results(const ReportData& data, Out out) {
@@ -92,7 +102,9 @@ void results(const ReportData& data, Out out) {
     fmt::format_to(out, "<p class='soft'>No results were recorded for this flight.</p>\n");
     return;
   }
-  fmt::format_to(out, "<div class='card scroll'><table><tr><th>Figure</th><th class='n'>Value</th><th class='n'>Bar</th><th></th></tr>\n");
+  fmt::format_to(out,
+                 "<div class='card scroll'><table><tr><th>Figure</th><th class='n'>Value</th><th "
+                 "class='n'>Bar</th><th></th></tr>\n");
   for (const auto& r : rows) result_row(r, out);
   fmt::format_to(out, "</table></div>\n");
 }
@@ -118,12 +130,17 @@ void mode_changes(const ReportData& data, Out out) {
   if (!data.commands || data.commands->rows() == 0) return;
   const auto t = data.commands->integers("due_at_ns");
   const auto mode = data.commands->texts("mode_name"), reason = data.commands->texts("reason_name");
-  fmt::format_to(out, "<h2>Changes of flight mode</h2>\n<div class='card scroll'><table><tr><th class='n'>Time</th><th>Mode</th><th>Reason</th></tr>\n");
+  fmt::format_to(out,
+                 "<h2>Changes of flight mode</h2>\n<div class='card scroll'><table><tr><th "
+                 "class='n'>Time</th><th>Mode</th><th>Reason</th></tr>\n");
   std::size_t shown = 0, more = 0;
   for (std::size_t i = 0; i < t.size(); ++i) {
     if (i > 0 && mode[i] == mode[i - 1] && reason[i] == reason[i - 1]) continue;
-    if (++shown > 60) ++more;
-    else fmt::format_to(out, "<tr><td class='n'>{:.2f} s</td><td>{}</td><td>{}</td></tr>\n", data.seconds(t[i]), escape_html(mode[i]), escape_html(reason[i]));
+    if (++shown > 60)
+      ++more;
+    else
+      fmt::format_to(out, "<tr><td class='n'>{:.2f} s</td><td>{}</td><td>{}</td></tr>\n", data.seconds(t[i]),
+                     escape_html(mode[i]), escape_html(reason[i]));
   }
   fmt::format_to(out, "</table>{}</div>\n", more > 0 ? fmt::format("<p class='soft small'>and {} more</p>", more) : "");
 }
@@ -139,13 +156,17 @@ std::string machine_line(const ReportData& data) {
 
 void latency_table(const ReportData& data, Out out) {
   fmt::format_to(out, "<div class='card scroll'><table><tr><th>Owner</th><th>Stage</th>");
-  for (const char* name : {"Count", "p50", "p99", "p99.9", "Max", "Budget", "Misses"}) fmt::format_to(out, "<th class='n'>{}</th>", name);
+  for (const char* name : {"Count", "p50", "p99", "p99.9", "Max", "Budget", "Misses"})
+    fmt::format_to(out, "<th class='n'>{}</th>", name);
   fmt::format_to(out, "</tr>\n");
   for (const auto& s : data.stages) {
-    fmt::format_to(out, "<tr><td>{}</td><td>{}</td><td class='n'>{}</td>", escape_html(s.owner), escape_html(s.stage), s.count);
-    for (const auto ns : {s.p50_ns, s.p99_ns, s.p999_ns, s.max_ns}) fmt::format_to(out, "<td class='n'>{}</td>", s.count > 0 ? duration_text(ns) : "-");
-    fmt::format_to(out, "<td class='n'>{}</td><td class='n {}'>{}</td></tr>\n", s.budget_ns > 0 ? duration_text(s.budget_ns) : "-",
-                   s.misses > 0 ? "bad" : "", s.budget_ns > 0 ? std::to_string(s.misses) : "-");
+    fmt::format_to(out, "<tr><td>{}</td><td>{}</td><td class='n'>{}</td>", escape_html(s.owner), escape_html(s.stage),
+                   s.count);
+    for (const auto ns : {s.p50_ns, s.p99_ns, s.p999_ns, s.max_ns})
+      fmt::format_to(out, "<td class='n'>{}</td>", s.count > 0 ? duration_text(ns) : "-");
+    fmt::format_to(out, "<td class='n'>{}</td><td class='n {}'>{}</td></tr>\n",
+                   s.budget_ns > 0 ? duration_text(s.budget_ns) : "-", s.misses > 0 ? "bad" : "",
+                   s.budget_ns > 0 ? std::to_string(s.misses) : "-");
   }
   fmt::format_to(out, "</table></div>\n");
 }
@@ -155,9 +176,12 @@ void histograms(const ReportData& data, Out out) {
   fmt::format_to(out, "<div class='pair' style='margin-top:16px'>\n");
   for (const auto& s : data.stages) {
     if (s.count == 0 || s.buckets.empty()) continue;
-    fmt::format_to(out, "<div class='card'><h3>{}: {}</h3><p class='soft small'>{} samples, p50 {}, p99 {}, p99.9 {}, max {}{}</p><div class='scroll'>{}</div></div>\n",
-                   escape_html(s.owner), escape_html(s.stage), s.count, duration_text(s.p50_ns), duration_text(s.p99_ns), duration_text(s.p999_ns),
-                   duration_text(s.max_ns), s.budget_ns > 0 ? fmt::format("; budget {}, {} missed", duration_text(s.budget_ns), s.misses) : "",
+    fmt::format_to(out,
+                   "<div class='card'><h3>{}: {}</h3><p class='soft small'>{} samples, p50 {}, p99 {}, p99.9 {}, max "
+                   "{}{}</p><div class='scroll'>{}</div></div>\n",
+                   escape_html(s.owner), escape_html(s.stage), s.count, duration_text(s.p50_ns),
+                   duration_text(s.p99_ns), duration_text(s.p999_ns), duration_text(s.max_ns),
+                   s.budget_ns > 0 ? fmt::format("; budget {}, {} missed", duration_text(s.budget_ns), s.misses) : "",
                    histogram_svg(s, range));
   }
   fmt::format_to(out, "</div>\n");
@@ -177,10 +201,12 @@ void counters(const ReportData& data, Out out) {
   if (!data.status.present) return;
   const RunSummary& s = data.status;
   fmt::format_to(out, "<h2>Counters of the flight process</h2>\n<div class='card scroll'><table><tr>");
-  for (const char* name : {"Ticks", "Skipped", "Deadline misses", "Minor faults", "Major faults", "Frames lost", "Bad link frames", "Reconnects"})
+  for (const char* name : {"Ticks", "Skipped", "Deadline misses", "Minor faults", "Major faults", "Frames lost",
+                           "Bad link frames", "Reconnects"})
     fmt::format_to(out, "<th class='n'>{}</th>", name);
   fmt::format_to(out, "</tr><tr>");
-  for (const auto n : {s.ticks, s.skipped, s.deadline_misses, s.minor_faults, s.major_faults, s.frames_lost, s.bad_frames, s.link_reconnects})
+  for (const auto n : {s.ticks, s.skipped, s.deadline_misses, s.minor_faults, s.major_faults, s.frames_lost,
+                       s.bad_frames, s.link_reconnects})
     fmt::format_to(out, "<td class='n'>{}</td>", n);
   fmt::format_to(out, "</tr></table></div>\n");
 }
@@ -203,9 +229,11 @@ Outcome outcome_of(const ReportData& data) {
 std::string report_page(const ReportData& data) {
   std::string page;
   const Out out(page);
-  fmt::format_to(out, "<!DOCTYPE html>\n<html lang='en'><head><meta charset='utf-8'>\n"
-                 "<meta name='viewport' content='width=device-width, initial-scale=1'>\n<title>Flight {}</title>\n<style>",
-                 escape_html(text_at(data.run, "name")));
+  fmt::format_to(
+      out,
+      "<!DOCTYPE html>\n<html lang='en'><head><meta charset='utf-8'>\n"
+      "<meta name='viewport' content='width=device-width, initial-scale=1'>\n<title>Flight {}</title>\n<style>",
+      escape_html(text_at(data.run, "name")));
   page += report_style();
   fmt::format_to(out, "</style></head>\n<body><main>\n");
   heading(data, out);
@@ -216,7 +244,8 @@ std::string report_page(const ReportData& data) {
   mode_changes(data, out);
   latencies(data, out);
   counters(data, out);
-  fmt::format_to(out, "<p class='soft small'>Written by wasp-report from the logs beside this file.</p>\n</main></body></html>\n");
+  fmt::format_to(
+      out, "<p class='soft small'>Written by wasp-report from the logs beside this file.</p>\n</main></body></html>\n");
   return page;
 }
 

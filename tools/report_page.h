@@ -9,7 +9,8 @@ namespace wasp::tools {
 
 std::string report_page(const ReportData& data);
 
-/// The outcome in plain words, e.g. "All 6 bars met". `good` is false when a bar was missed, empty when none was judged.
+/// The outcome in plain words, e.g. "All 6 bars met". `good` is false when a bar was missed, empty when none was
+/// judged.
 struct Outcome {
   std::string text;
   std::optional<bool> good;

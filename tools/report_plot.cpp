@@ -53,7 +53,12 @@ Frame frame_of(const Plot& plot) {
     xs.push_back(&c.series.x);
     ys.push_back(&c.series.y);
   }
-  Frame f{kLeft, 8 + kLegendRow * legend_rows(plot) + (plot.spans.empty() ? 0 : 4), plot.width - kRight, plot.height - kBottom, {}, {}};
+  Frame f{kLeft,
+          8 + kLegendRow * legend_rows(plot) + (plot.spans.empty() ? 0 : 4),
+          plot.width - kRight,
+          plot.height - kBottom,
+          {},
+          {}};
   f.x = plot.equal_axes ? widened(range_of(xs), plot.least_y_span, 0.06) : widened(range_of(xs), 0, 0);
   f.y = widened(range_of(ys), plot.least_y_span, 0.06);
   if (plot.equal_axes) make_equal(f);
@@ -65,7 +70,8 @@ void draw_spans(const Plot& plot, const Frame& f, Out out) {
     const Span& s = plot.spans[i];
     const double a = std::clamp(f.px(s.from), f.x0, f.x1), b = std::clamp(f.px(s.to), f.x0, f.x1);
     if (b <= a) continue;
-    fmt::format_to(out, "<rect class='span{}' x='{:.1f}' y='{:.1f}' width='{:.1f}' height='{:.1f}'><title>{}</title></rect>",
+    fmt::format_to(out,
+                   "<rect class='span{}' x='{:.1f}' y='{:.1f}' width='{:.1f}' height='{:.1f}'><title>{}</title></rect>",
                    i % 2, a, f.y0, b - a, f.y1 - f.y0, escape_html(s.name));
   }
 }
@@ -75,7 +81,8 @@ void draw_span_names(const Plot& plot, const Frame& f, Out out) {
   for (const Span& s : plot.spans) {
     const double a = std::clamp(f.px(s.from), f.x0, f.x1), b = std::clamp(f.px(s.to), f.x0, f.x1);
     if (text_width(s.name) + 8 < b - a)
-      fmt::format_to(out, "<text class='faint halo' x='{:.1f}' y='{:.1f}'>{}</text>", a + 4, f.y0 + 13, escape_html(s.name));
+      fmt::format_to(out, "<text class='faint halo' x='{:.1f}' y='{:.1f}'>{}</text>", a + 4, f.y0 + 13,
+                     escape_html(s.name));
   }
 }
 
@@ -85,15 +92,18 @@ void draw_axes(const Plot& plot, const Frame& f, Out out) {
   const double x_step = xs.size() > 1 ? xs[1] - xs[0] : 1, y_step = ys.size() > 1 ? ys[1] - ys[0] : 1;
   for (const double v : ys) {
     fmt::format_to(out, "<path class='grid' d='M{:.1f} {:.1f}H{:.1f}'/>", f.x0, f.py(v), f.x1);
-    fmt::format_to(out, "<text class='end' x='{:.1f}' y='{:.1f}'>{}</text>", f.x0 - 6, f.py(v) + 4, tick_text(v, y_step));
+    fmt::format_to(out, "<text class='end' x='{:.1f}' y='{:.1f}'>{}</text>", f.x0 - 6, f.py(v) + 4,
+                   tick_text(v, y_step));
   }
   for (const double v : xs) {
     fmt::format_to(out, "<path class='grid' d='M{:.1f} {:.1f}V{:.1f}'/>", f.px(v), f.y0, f.y1);
     fmt::format_to(out, "<text class='mid' x='{:.1f}' y='{:.1f}'>{}</text>", f.px(v), f.y1 + 16, tick_text(v, x_step));
   }
   fmt::format_to(out, "<path class='axis' d='M{0:.1f} {1:.1f}V{3:.1f}H{2:.1f}'/>", f.x0, f.y0, f.x1, f.y1);
-  fmt::format_to(out, "<text class='mid name' x='{:.1f}' y='{}'>{}</text>", 0.5 * (f.x0 + f.x1), plot.height - 6, escape_html(plot.x_label));
-  fmt::format_to(out, "<text class='mid name' transform='translate(13 {:.1f}) rotate(-90)'>{}</text>", 0.5 * (f.y0 + f.y1), escape_html(plot.y_label));
+  fmt::format_to(out, "<text class='mid name' x='{:.1f}' y='{}'>{}</text>", 0.5 * (f.x0 + f.x1), plot.height - 6,
+                 escape_html(plot.x_label));
+  fmt::format_to(out, "<text class='mid name' transform='translate(13 {:.1f}) rotate(-90)'>{}</text>",
+                 0.5 * (f.y0 + f.y1), escape_html(plot.y_label));
 }
 
 void draw_curve(const Curve& curve, const Frame& f, Out out) {
@@ -116,16 +126,17 @@ void draw_legend(const Plot& plot, Out out) {
       x = kLeft;
       y += kLegendRow;
     }
-    fmt::format_to(out, "<path class='line {} {}' d='M{:.1f} {:.1f}h18'/><text x='{:.1f}' y='{:.1f}'>{}</text>", c.style.colour,
-                   c.style.stroke, x, y - 4, x + 23, y, escape_html(c.name));
+    fmt::format_to(out, "<path class='line {} {}' d='M{:.1f} {:.1f}h18'/><text x='{:.1f}' y='{:.1f}'>{}</text>",
+                   c.style.colour, c.style.stroke, x, y - 4, x + 23, y, escape_html(c.name));
     x += wide;
   }
 }
 
 void draw_marks(const Plot& plot, const Frame& f, Out out) {
   for (const auto& m : plot.marks)
-    fmt::format_to(out, "<circle class='mark' cx='{0:.1f}' cy='{1:.1f}' r='4'/><text x='{2:.1f}' y='{3:.1f}'>{4}</text>", f.px(m.x),
-                   f.py(m.y), f.px(m.x) + 7, f.py(m.y) - 6, escape_html(m.name));
+    fmt::format_to(out,
+                   "<circle class='mark' cx='{0:.1f}' cy='{1:.1f}' r='4'/><text x='{2:.1f}' y='{3:.1f}'>{4}</text>",
+                   f.px(m.x), f.py(m.y), f.px(m.x) + 7, f.py(m.y) - 6, escape_html(m.name));
 }
 
 }  // namespace
@@ -133,12 +144,18 @@ void draw_marks(const Plot& plot, const Frame& f, Out out) {
 std::string escape_html(std::string_view text) {
   std::string out;
   for (const char c : text) {
-    if (c == '&') out += "&amp;";
-    else if (c == '<') out += "&lt;";
-    else if (c == '>') out += "&gt;";
-    else if (c == '"') out += "&quot;";
-    else if (c == '\'') out += "&#39;";
-    else out += c;
+    if (c == '&')
+      out += "&amp;";
+    else if (c == '<')
+      out += "&lt;";
+    else if (c == '>')
+      out += "&gt;";
+    else if (c == '"')
+      out += "&quot;";
+    else if (c == '\'')
+      out += "&#39;";
+    else
+      out += c;
   }
   return out;
 }

@@ -66,7 +66,8 @@ std::vector<double> nice_ticks(Range range, int wanted) {
       break;
     }
   std::vector<double> ticks;
-  for (double k = std::ceil(range.low / step - 1e-9); k * step <= range.high + 1e-9 * step && ticks.size() < 100; k += 1)
+  for (double k = std::ceil(range.low / step - 1e-9); k * step <= range.high + 1e-9 * step && ticks.size() < 100;
+       k += 1)
     ticks.push_back(k * step == 0 ? 0.0 : k * step);
   return ticks;
 }

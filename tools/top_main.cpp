@@ -26,8 +26,9 @@ std::atomic<bool> stop_requested{false};
 std::string only_instance() {
   const auto names = tools::list_instances();
   if (names.size() == 1) return names.front();
-  fmt::print(stderr, "wasp-top: {}\n", names.empty() ? "no instance is running (nothing in shared memory)"
-                                                     : "several instances; choose one with --instance:");
+  fmt::print(stderr, "wasp-top: {}\n",
+             names.empty() ? "no instance is running (nothing in shared memory)"
+                           : "several instances; choose one with --instance:");
   for (const auto& name : names) fmt::print("{}\n", name);
   return {};
 }
@@ -69,7 +70,8 @@ int watch(const std::string& instance, bool once, bool json, double period_s) {
     const auto snapshot = observer.look();
     show(snapshot, json, in_place);
     if (once) {
-      const bool any = std::any_of(snapshot.regions.begin(), snapshot.regions.end(), [](const auto& r) { return r.attached; });
+      const bool any =
+          std::any_of(snapshot.regions.begin(), snapshot.regions.end(), [](const auto& r) { return r.attached; });
       if (!any) fmt::print(stderr, "wasp-top: instance '{}' has no region in shared memory\n", instance);
       return any ? 0 : 1;
     }
@@ -89,7 +91,9 @@ int main(int argc, char** argv) {
   app.add_option("--instance", instance, "Instance to watch; may be left out when there is exactly one");
   app.add_flag("--once", once, "Print once and end; exit code 1 if the instance has no region");
   app.add_flag("--json", json, "One JSON document a look, a line each");
-  app.add_option("--period-s", period_s, "Time between looks [s]")->check(CLI::Range(0.05, 60.0))->capture_default_str();
+  app.add_option("--period-s", period_s, "Time between looks [s]")
+      ->check(CLI::Range(0.05, 60.0))
+      ->capture_default_str();
   CLI11_PARSE(app, argc, argv);
   if (instance.empty() && (instance = only_instance()).empty()) return 1;
 

@@ -39,9 +39,16 @@ std::optional<Command> newest_command(const shm::Region& region) {
 }
 
 nlohmann::json command_json(const Command& c) {
-  return {{"tick", c.tick}, {"mode", mode_name(c.mode)}, {"reason", reason_name(c.reason)}, {"phase", c.mission_phase},
-          {"height_m", c.height_m}, {"height_setpoint_m", c.height_setpoint_m}, {"thrust", c.thrust},
-          {"climb_rate_mps", c.climb_rate_mps}, {"cue_source", c.cue_source}, {"sent", c.sent != 0}};
+  return {{"tick", c.tick},
+          {"mode", mode_name(c.mode)},
+          {"reason", reason_name(c.reason)},
+          {"phase", c.mission_phase},
+          {"height_m", c.height_m},
+          {"height_setpoint_m", c.height_setpoint_m},
+          {"thrust", c.thrust},
+          {"climb_rate_mps", c.climb_rate_mps},
+          {"cue_source", c.cue_source},
+          {"sent", c.sent != 0}};
 }
 
 }  // namespace
@@ -102,10 +109,17 @@ nlohmann::json top_json(const TopSnapshot& s) {
   document["real_time"] = s.run.present ? nlohmann::json(s.run.real_time) : nlohmann::json(nullptr);
   document["topics"] = document["regions"] = nlohmann::json::array();
   for (const auto& r : s.regions)
-    document["regions"].push_back({{"name", r.name}, {"attached", r.attached}, {"writer_alive", r.writer_alive},
-                                   {"writer_pid", r.writer_pid}, {"writer_restarts", r.writer_restarts}, {"note", r.note}});
+    document["regions"].push_back({{"name", r.name},
+                                   {"attached", r.attached},
+                                   {"writer_alive", r.writer_alive},
+                                   {"writer_pid", r.writer_pid},
+                                   {"writer_restarts", r.writer_restarts},
+                                   {"note", r.note}});
   for (const auto& t : s.topics)
-    document["topics"].push_back({{"region", t.region}, {"name", t.name}, {"type", t.type}, {"slots", t.slots},
+    document["topics"].push_back({{"region", t.region},
+                                  {"name", t.name},
+                                  {"type", t.type},
+                                  {"slots", t.slots},
                                   {"rate_hz", std::round(t.rate_hz * 1000) / 1000},
                                   {"age_ms", t.age_ms ? nlohmann::json(*t.age_ms) : nlohmann::json(nullptr)},
                                   {"published", t.published}});

@@ -34,8 +34,8 @@ struct TopSnapshot {
   std::vector<TopicState> topics;
   std::vector<StageSummary> stages;
   RunSummary run;
-  std::optional<Command> command;  ///< newest
-  std::vector<std::string> events; ///< newest last
+  std::optional<Command> command;   ///< newest
+  std::vector<std::string> events;  ///< newest last
 };
 
 /// Follows the three regions of an instance; each may come and go between looks.

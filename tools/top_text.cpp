@@ -34,17 +34,21 @@ void add_regions(const TopSnapshot& s, Lines& lines) {
 void add_flight(const TopSnapshot& s, Lines& lines) {
   if (s.command) {
     const Command& c = *s.command;
-    lines.push_back(fmt::format("mode {} ({})   phase {}   tick {}   height {:.2f} m of {:.2f} m   climb {:+.2f} m/s   thrust {:.2f}",
-                                mode_name(c.mode), reason_name(c.reason), c.mission_phase, c.tick, c.height_m,
-                                c.height_setpoint_m, c.climb_rate_mps, c.thrust));
+    lines.push_back(fmt::format(
+        "mode {} ({})   phase {}   tick {}   height {:.2f} m of {:.2f} m   climb {:+.2f} m/s   thrust {:.2f}",
+        mode_name(c.mode), reason_name(c.reason), c.mission_phase, c.tick, c.height_m, c.height_setpoint_m,
+        c.climb_rate_mps, c.thrust));
   } else {
     lines.emplace_back("no command yet");
   }
   if (!s.run.present) return;
   const RunSummary& r = s.run;
-  lines.push_back(fmt::format("{}, mission {}   ticks {}   skipped {}   deadline misses {}   page faults {} minor {} major",
-                              r.finished ? "finished" : r.armed ? "armed" : "disarmed", mission_text(r.mission_result),
-                              r.ticks, r.skipped, r.deadline_misses, r.minor_faults, r.major_faults));
+  lines.push_back(fmt::format(
+      "{}, mission {}   ticks {}   skipped {}   deadline misses {}   page faults {} minor {} major",
+      r.finished ? "finished"
+      : r.armed  ? "armed"
+                 : "disarmed",
+      mission_text(r.mission_result), r.ticks, r.skipped, r.deadline_misses, r.minor_faults, r.major_faults));
   lines.push_back(fmt::format("frames lost {}   bad link frames {}   link reconnects {}", r.frames_lost, r.bad_frames,
                               r.link_reconnects));
 }
@@ -58,8 +62,8 @@ void add_topics(const TopSnapshot& s, Lines& lines) {
 }
 
 void add_stages(const TopSnapshot& s, Lines& lines) {
-  lines.push_back(fmt::format("{:<20} {:<14} {:>9} {:>9} {:>9} {:>9} {:>9} {:>9} {:>7}", "OWNER", "STAGE", "COUNT", "p50",
-                              "p99", "p99.9", "max", "budget", "misses"));
+  lines.push_back(fmt::format("{:<20} {:<14} {:>9} {:>9} {:>9} {:>9} {:>9} {:>9} {:>7}", "OWNER", "STAGE", "COUNT",
+                              "p50", "p99", "p99.9", "max", "budget", "misses"));
   for (const auto& st : s.stages)
     lines.push_back(fmt::format("{:<20} {:<14} {:>9} {:>9} {:>9} {:>9} {:>9} {:>9} {:>7}", st.owner, st.stage, st.count,
                                 duration_text(st.p50_ns), duration_text(st.p99_ns), duration_text(st.p999_ns),
@@ -69,7 +73,8 @@ void add_stages(const TopSnapshot& s, Lines& lines) {
 
 /// Whatever another process wrote must not steer the terminal.
 void make_printable(std::string& line) {
-  std::replace_if(line.begin(), line.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, '?');
+  std::replace_if(
+      line.begin(), line.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, '?');
 }
 
 }  // namespace

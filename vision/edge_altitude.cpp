@@ -21,8 +21,8 @@ float smooth(const EdgeAltitude::Params& p, TimeNs now_ns, float height_m, EdgeA
     const auto dt_s = static_cast<float>(to_seconds(now_ns - state.filtered_at_ns));
     weight = 1.f - std::exp(-dt_s / p.smoothing_s);
   }
-  state.filtered_height_m = weight < 1.f ? state.filtered_height_m + weight * (height_m - state.filtered_height_m)
-                                         : height_m;
+  state.filtered_height_m =
+      weight < 1.f ? state.filtered_height_m + weight * (height_m - state.filtered_height_m) : height_m;
   state.filtered_at_ns = now_ns;
   return state.filtered_height_m;
 }
@@ -47,7 +47,8 @@ CueBody EdgeAltitude::step(const Params& params, const BehaviourInput& input, St
   if (!usable(k) || !input.gray.valid() || input.gray.width_px != k.width_px || input.gray.height_px != k.height_px)
     return cue;
   const bool attitude = input.attitude_valid && attitude_usable(input.attitude.q_ned_body);
-  const Vec3 up_cam = up_in_camera(params.camera, attitude ? input.attitude.q_ned_body : std::array{1.f, 0.f, 0.f, 0.f});
+  const Vec3 up_cam =
+      up_in_camera(params.camera, attitude ? input.attitude.q_ned_body : std::array{1.f, 0.f, 0.f, 0.f});
   EdgeRowsParams rows_params{.min_threshold = params.min_threshold};
   rows_params.kind = suitable_kind(suitable_model(params.height, k, up_cam));
   EdgeRows rows;

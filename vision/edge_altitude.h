@@ -22,9 +22,9 @@ struct EdgeAltitude {
   struct Params {
     CameraGeometry camera;
     EdgeHeightParams height;
-    int min_threshold = 8;       ///< Sobel units, see EdgeRowsParams
-    float max_misfit = 0.25f;    ///< distribution model: a larger gap is no Poisson floor
-    float smoothing_s = 0.3f;    ///< time constant of the low pass; 0: none
+    int min_threshold = 8;     ///< Sobel units, see EdgeRowsParams
+    float max_misfit = 0.25f;  ///< distribution model: a larger gap is no Poisson floor
+    float smoothing_s = 0.3f;  ///< time constant of the low pass; 0: none
   };
 
   /// The filter's memory: what it last said and when.

@@ -102,7 +102,10 @@ TEST(HeightFilter, AJumpIsBelievedOnlyWhenItStays) {
   HeightFilterState s;
   correct(p, 1.f, 1, 1, s);
   TimeNs now = 0;
-  for (int i = 1; i < p.jumps_to_accept; ++i) correct(p, 3.f, now = i * 50 * kMillisecond, now, s);
+  for (int i = 1; i < p.jumps_to_accept; ++i) {
+    now += 50 * kMillisecond;
+    correct(p, 3.f, now, now, s);
+  }
   EXPECT_NEAR(s.height_m, 1.f, 1e-3f);
   now += 50 * kMillisecond;
   correct(p, 3.f, now, now, s);

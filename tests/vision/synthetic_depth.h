@@ -32,9 +32,9 @@ struct Scene {
   bool has_floor = true;
   std::vector<Surface> walls;
   std::vector<Patch> patches;
-  float noise_per_m = 0.0014f;   ///< sigma of inverse depth
+  float noise_per_m = 0.0014f;  ///< sigma of inverse depth
   float missing_share = 0.1f;
-  float clutter_share = 0.f;     ///< pixels replaced by something at random in front of the floor
+  float clutter_share = 0.f;  ///< pixels replaced by something at random in front of the floor
   float max_depth_m = 8.f;
 };
 

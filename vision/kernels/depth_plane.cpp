@@ -16,13 +16,14 @@ struct Draws {
   int tried, scored;
 };
 constexpr Draws kColdDraws{512, 112}, kWarmDraws{128, 32};
+constexpr int kRounds = 3;  // of drawing and fitting, until something passes the gates
 constexpr int kKept = 4;
 constexpr int kPolishPasses = 4;
 constexpr std::array kReachCells = {4, 7, 10, 16};  // of a three-point draw about its first point, in turn
-constexpr int kBelowPenalty = 4;               // one sample below outweighs four on the plane
+constexpr int kBelowPenalty = 4;                    // one sample below outweighs four on the plane
 constexpr float kSigmas = 3.f;
-constexpr float kWarmSupport = 0.7f;  // of last frame's support that last frame's plane must keep
-constexpr float kFirstFit = 2.f;  // tolerance of the first fit, in units of the final one
+constexpr float kWarmSupport = 0.7f;      // of last frame's support that last frame's plane must keep
+constexpr float kFirstFit = 2.f;          // tolerance of the first fit, in units of the final one
 constexpr float kMinTripleArea = 0.004f;  // of the ray square; 640x480 at f 525 spans 1.1
 constexpr float kMinHeight_m = 0.03f, kMaxHeight_m = 20.f;
 
@@ -151,7 +152,8 @@ void draw_candidates(Search& search, DepthPlaneState& state) noexcept {
     for (int i = 0; i < kGravityDraws; ++i) consider_gravity(search, state.random);
   const Draws draws = warm ? kWarmDraws : kColdDraws;
   for (int draw = 0, scored = 0; draw < draws.tried && scored < draws.scored; ++draw)
-    scored += consider_triple(search, kReachCells[static_cast<std::size_t>(draw) % kReachCells.size()], state.random) ? 1 : 0;
+    scored +=
+        consider_triple(search, kReachCells[static_cast<std::size_t>(draw) % kReachCells.size()], state.random) ? 1 : 0;
 }
 
 PlaneTolerance widened(const PlaneTolerance& t, float factor) noexcept {
@@ -227,10 +229,13 @@ PlaneEstimate estimate_floor(const DepthPlaneParams& params, const Intrinsics& i
   }
   fill_preview(frame);
   Search search{frame, prior, {kSigmas * params.sensor_sigma_per_m, params.flatness_m}, std::cos(prior.max_angle_rad)};
-  draw_candidates(search, state);
-  const Candidate best = best_fitted(search);
-  const PlaneEstimate estimate =
-      best.score == Candidate{}.score ? PlaneEstimate{} : polish(params, search, best.plane);
+  PlaneEstimate estimate;
+  for (int round = 0; round < kRounds && !estimate.valid; ++round) {
+    draw_candidates(search, state);
+    const Candidate best = best_fitted(search);
+    if (best.score != Candidate{}.score) estimate = polish(params, search, best.plane);
+    state.warm = false;  // another round starts from nothing
+  }
   state.warm = estimate.valid;
   if (estimate.valid) {
     state.last_share = estimate.inlier_share;

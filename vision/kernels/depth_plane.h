@@ -20,11 +20,11 @@ struct DepthPlaneParams {
   /// One sigma of inverse depth. First-generation Kinect: 0.0014 /m of noise (Khoshelham and Elberink 2012,
   /// 1.4 mm at 1 m growing with z^2; its disparity steps are 0.0029 /m) and as much again of uncorrected lens error.
   float sensor_sigma_per_m = 0.002f;
-  float flatness_m = 0.01f;          ///< how uneven a floor may be
-  float min_inlier_share = 0.06f;    ///< of the valid samples
-  int min_inliers = 40;              ///< of kSampleCount
-  float max_below_share = 0.04f;     ///< samples below the plane, of the valid samples ...
-  float max_below_ratio = 0.3f;      ///< ... and of the inliers
+  float flatness_m = 0.01f;        ///< how uneven a floor may be
+  float min_inlier_share = 0.06f;  ///< of the valid samples
+  int min_inliers = 40;            ///< of kSampleCount
+  float max_below_share = 0.04f;   ///< samples below the plane, of the valid samples ...
+  float max_below_ratio = 0.3f;    ///< ... and of the inliers
   float max_normal_sigma_rad = 0.035f;
 };
 
@@ -57,7 +57,8 @@ struct DepthPlaneState {
 };
 
 /// One frame. `depth` is uint16 millimetres, 0 and 65535 invalid, of the size the intrinsics name; anything else, or
-/// parameters that are not finite, give an invalid estimate. Constant trip counts. Realtime-safe: yes.
+/// parameters that are not finite, give an invalid estimate. Bounded: at most three rounds of fixed trip counts, the
+/// second and third only when the one before found no floor. Realtime-safe: yes.
 PlaneEstimate estimate_floor(const DepthPlaneParams& params, const Intrinsics& intrinsics, const DepthView& depth,
                              const GravityPrior& prior, DepthPlaneState& state) noexcept;
 

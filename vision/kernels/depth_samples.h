@@ -19,17 +19,17 @@ inline constexpr int kMinImageSide = 16;  ///< smaller images are refused
 struct SampleTable {
   Intrinsics intrinsics{.width_px = 0, .height_px = 0};  ///< key
   std::array<std::uint16_t, kSampleCount> u_px{}, v_px{};
-  std::array<float, kSampleCount> x{}, y{};   ///< undistorted ray
+  std::array<float, kSampleCount> x{}, y{};       ///< undistorted ray
   std::array<std::uint8_t, kSampleCount> seen{};  ///< 0: the lens model has no ray here
 };
 
 /// The valid samples of one frame, packed, in row-major cell order.
 struct DepthSamples {
   int count = 0;
-  alignas(32) std::array<float, kSampleCount> x, y;      ///< ray [-]
-  alignas(32) std::array<float, kSampleCount> w;         ///< inverse depth [1/m]
-  std::array<std::int16_t, kSampleCount> of_cell;        ///< cell to sample index, -1 where invalid
-  std::array<std::int16_t, kSampleCount> cell;           ///< sample index to cell
+  alignas(32) std::array<float, kSampleCount> x, y;  ///< ray [-]
+  alignas(32) std::array<float, kSampleCount> w;     ///< inverse depth [1/m]
+  std::array<std::int16_t, kSampleCount> of_cell;    ///< cell to sample index, -1 where invalid
+  std::array<std::int16_t, kSampleCount> cell;       ///< sample index to cell
 };
 
 /// Range of depth that counts [m].

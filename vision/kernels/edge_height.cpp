@@ -14,9 +14,9 @@ constexpr float kFlatRatio = 3.f;  // slope of s from top to bottom below which 
 
 /// One band of floor rows: its share of edges, and s at three places.
 struct Band {
-  float edges;       ///< E_v summed
-  float slope;       ///< |s'| at the centre [1/px]
-  float gap;         ///< s(v) - s(v + delta), at the centre, clipped at the last row
+  float edges;  ///< E_v summed
+  float slope;  ///< |s'| at the centre [1/px]
+  float gap;    ///< s(v) - s(v + delta), at the centre, clipped at the last row
 };
 
 struct Bands {
@@ -121,8 +121,8 @@ float minimise(const Bands& bands, float low, float high) noexcept {
 float expected_share(const EdgeHeightParams& p, const RowGeometry& g, const Bands& bands, float mu) noexcept {
   float sum = 0.f;
   for (int i = 0; i < bands.count; ++i) {
-    const float v = static_cast<float>(bands.first_row) + (static_cast<float>(i) + 0.5f) *
-                    static_cast<float>(bands.rows) / static_cast<float>(bands.count);
+    const float v = static_cast<float>(bands.first_row) +
+                    (static_cast<float>(i) + 0.5f) * static_cast<float>(bands.rows) / static_cast<float>(bands.count);
     sum += std::min(1.f, p.edge_thickness_px * (1.f - std::exp(-mu * g.slope(v))));
   }
   return sum / static_cast<float>(bands.count);
@@ -182,8 +182,7 @@ EdgeHeight estimate_edge_height(const EdgeHeightParams& params, const Intrinsics
   const bool by_rows = out.model == EdgeModel::kDistribution;
   const float low = std::log(params.edges_per_m * params.min_height_m);
   const float high = std::log(params.edges_per_m * params.max_height_m);
-  const float log_mu = by_rows ? minimise(bands, low, high)
-                               : solve_count(params, g, bands, out.edge_share, low, high);
+  const float log_mu = by_rows ? minimise(bands, low, high) : solve_count(params, g, bands, out.edge_share, low, high);
   out.edges_per_height = std::exp(log_mu);
   out.height_m = out.edges_per_height / params.edges_per_m;
   out.mode_height_m = by_rows ? mode_mu(params, k, g, rows, bands) / params.edges_per_m : 0.f;

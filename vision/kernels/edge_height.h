@@ -37,11 +37,11 @@ struct EdgeHeight {
   bool valid = false;
   EdgeModel model = EdgeModel::kDistribution;  ///< the one used
   float height_m = 0;
-  float height_sigma_m = 0;  ///< spread seen in practice plus misfit; not a derived error
-  float edges_per_height = 0;  ///< mu; divide by a known height to calibrate lambda
-  float mode_height_m = 0;     ///< (7.36) from the row of most edges; 0 where it does not apply
-  float misfit = 0;            ///< largest gap between the two distributions, 0 ... 1 (count model: 0)
-  float edge_share = 0;        ///< edge pixels / floor pixels
+  float height_sigma_m = 0;           ///< spread seen in practice plus misfit; not a derived error
+  float edges_per_height = 0;         ///< mu; divide by a known height to calibrate lambda
+  float mode_height_m = 0;            ///< (7.36) from the row of most edges; 0 where it does not apply
+  float misfit = 0;                   ///< largest gap between the two distributions, 0 ... 1 (count model: 0)
+  float edge_share = 0;               ///< edge pixels / floor pixels
   int first_row_px = 0, rows_px = 0;  ///< rows taken as floor
 };
 

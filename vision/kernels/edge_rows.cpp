@@ -148,8 +148,7 @@ void count_edge_rows(const EdgeRowsParams& params, const GrayView& image, const 
   out.gradient_rms = static_cast<float>(rms);
   out.threshold = std::max(std::clamp(params.min_threshold, 1, 1024), static_cast<int>(std::ceil(rms)));
   const RowCounter counter{params, image, depth, out.threshold, mask_limit_mm(params, image, depth)};
-  for (int v = 1; v < image.height_px - 1; ++v)
-    out.total += out.count[static_cast<std::size_t>(v)] = counter.count(v);
+  for (int v = 1; v < image.height_px - 1; ++v) out.total += out.count[static_cast<std::size_t>(v)] = counter.count(v);
 }
 
 }  // namespace wasp::vision

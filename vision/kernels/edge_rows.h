@@ -20,17 +20,17 @@ enum class EdgeKind : std::uint8_t { kBrighterBelow, kHorizontal, kAnyDirection 
 
 struct EdgeRowsParams {
   EdgeKind kind = EdgeKind::kHorizontal;
-  int min_threshold = 8;        ///< Sobel units: below this the RMS is sensor noise, not structure
-  float mask_beyond_m = 0.f;    ///< edges at or beyond this depth do not count (7.41); 0 switches the mask off
+  int min_threshold = 8;      ///< Sobel units: below this the RMS is sensor noise, not structure
+  float mask_beyond_m = 0.f;  ///< edges at or beyond this depth do not count (7.41); 0 switches the mask off
 };
 
 /// Row histogram. Rows 0 and height-1 and columns 0 and width-1 have no Sobel value and no edges.
 struct EdgeRows {
   bool valid = false;
   int width_px = 0, height_px = 0;
-  int threshold = 0;       ///< k_s: smallest |G| that counts
-  float gradient_rms = 0;  ///< Sobel units
-  std::int64_t total = 0;  ///< edge pixels
+  int threshold = 0;                               ///< k_s: smallest |G| that counts
+  float gradient_rms = 0;                          ///< Sobel units
+  std::int64_t total = 0;                          ///< edge pixels
   std::array<std::int32_t, kMaxEdgeRows> count{};  ///< E_v, by image row
 };
 

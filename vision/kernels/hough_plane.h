@@ -18,8 +18,8 @@ namespace wasp::vision {
 struct HoughParams {
   HoughSamplerParams sampling;
   DepthRange range;
-  int bins = 200;            ///< per axis, 8 ... 255
-  int accept_votes = 10;     ///< T_A, 2 ... 1000
+  int bins = 200;                ///< per axis, 8 ... 255
+  int accept_votes = 10;         ///< T_A, 2 ... 1000
   int max_draws = kHoughTuples;  ///< T_I, at most kHoughTuples
   float max_distance_m = 4.f;    ///< d_max of local (Cartesian), between any two of the three points
   float max_rho_m = 10.f;        ///< upper end of the rho axis

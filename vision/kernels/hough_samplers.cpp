@@ -76,7 +76,9 @@ struct Drawer {
       case HoughSampler::kLocalImage:
         for (const std::size_t i : {1u, 2u}) set_gaussian(t, i);
         break;
-      case HoughSampler::kOrthogonal: set_orthogonal(t); break;
+      case HoughSampler::kOrthogonal:
+        set_orthogonal(t);
+        break;
     }
     return t;
   }

@@ -1,0 +1,252 @@
+// The serial port on a pseudo-terminal: set-up, partial writes, hang-up, reopening by path, exclusive use.
+#include "drivers/serial_port.h"
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <pty.h>
+#include <sys/ioctl.h>
+#include <termios.h>
+#include <unistd.h>
+
+#include <array>
+#include <filesystem>
+#include <thread>
+#include <vector>
+
+#include "rt/clock.h"
+
+namespace wasp::drivers {
+namespace {
+
+/// The far end of the line, and a path that stays the same when the device behind it changes.
+class FarEnd {
+ public:
+  explicit FarEnd(std::filesystem::path link) : link_(std::move(link)) { plug_in(); }
+  ~FarEnd() {
+    unplug();
+    std::filesystem::remove(link_);
+  }
+  void plug_in() {
+    int slave = -1;
+    std::array<char, 128> name{};
+    ASSERT_EQ(openpty(&master_, &slave, name.data(), nullptr, nullptr), 0);
+    ::close(slave);
+    std::filesystem::remove(link_);
+    std::filesystem::create_symlink(name.data(), link_);
+  }
+  void unplug() {
+    if (master_ >= 0) ::close(master_);
+    master_ = -1;
+  }
+  [[nodiscard]] int fd() const { return master_; }
+  [[nodiscard]] std::string path() const { return link_.string(); }
+
+ private:
+  std::filesystem::path link_;
+  int master_ = -1;
+};
+
+std::filesystem::path own_link() {
+  const auto* test = testing::UnitTest::GetInstance()->current_test_info();
+  return std::filesystem::temp_directory_path() / ("wasp-serial-" + std::to_string(getpid()) + "-" + test->name());
+}
+
+/// Waits up to two seconds for `done`, by reading again and again.
+template <class Done>
+bool eventually(Done&& done) {
+  for (int i = 0; i < 2000; ++i) {
+    if (done()) return true;
+    rt::sleep_until(rt::now() + kMillisecond);
+  }
+  return false;
+}
+
+std::string refusal(std::string_view text) {
+  try {
+    SerialEndpoint::parse(text);
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+  return {};
+}
+
+TEST(SerialEndpoint, Parses) {
+  const auto usb = SerialEndpoint::parse("serial:/dev/ttyUSB0:921600");
+  EXPECT_EQ(usb.path, "/dev/ttyUSB0");
+  EXPECT_EQ(usb.baud, 921600u);
+  const auto by_path = SerialEndpoint::parse("serial:/dev/serial/by-path/pci-0000:00:14.0-usb-0:3:1.0-port0:57600");
+  EXPECT_EQ(by_path.path, "/dev/serial/by-path/pci-0000:00:14.0-usb-0:3:1.0-port0");
+  EXPECT_EQ(by_path.baud, 57600u);
+}
+
+TEST(SerialEndpoint, NamesWhatIsWrong) {
+  EXPECT_NE(refusal("/dev/ttyUSB0").find("/dev/ttyUSB0"), std::string::npos);
+  EXPECT_NE(refusal("serial:/dev/ttyUSB0").find("serial:<device>:<baud>"), std::string::npos);
+  EXPECT_NE(refusal("serial::921600").find("serial:<device>:<baud>"), std::string::npos);
+  EXPECT_NE(refusal("serial:ttyUSB0:921600").find("ttyUSB0"), std::string::npos);
+  EXPECT_NE(refusal("serial:/dev/ttyUSB0:fast").find("\"fast\""), std::string::npos);
+  EXPECT_NE(refusal("serial:/dev/ttyUSB0:921601").find("921601"), std::string::npos);
+  EXPECT_NE(refusal("serial:/dev/ttyUSB0:0").find("0"), std::string::npos);
+  EXPECT_NE(refusal("serial:/dev/ttyUSB0:").find("not a number"), std::string::npos);
+}
+
+TEST(SerialPort, NamesTheDeviceItCannotOpen) {
+  try {
+    SerialPort port({"/dev/wasp-no-such-device", 115200});
+    FAIL();
+  } catch (const std::runtime_error& error) {
+    EXPECT_NE(std::string(error.what()).find("/dev/wasp-no-such-device"), std::string::npos);
+  }
+  EXPECT_THROW(SerialPort({"/dev/null", 115200}), std::runtime_error);  // not a terminal
+}
+
+TEST(SerialPort, IsRawAndCloseOnExec) {
+  FarEnd far(own_link());
+  SerialPort port({far.path(), 921600});
+  termios line{};
+  ASSERT_EQ(tcgetattr(port.fd(), &line), 0);
+  EXPECT_EQ(cfgetospeed(&line), static_cast<speed_t>(B921600));
+  EXPECT_EQ(cfgetispeed(&line), static_cast<speed_t>(B921600));
+  EXPECT_EQ(line.c_lflag & (ICANON | ECHO | ISIG), 0u);
+  EXPECT_EQ(line.c_iflag & (IXON | ICRNL | ISTRIP), 0u);
+  EXPECT_EQ(line.c_oflag & OPOST, 0u);
+  EXPECT_EQ(line.c_cflag & CSIZE, static_cast<tcflag_t>(CS8));
+  EXPECT_EQ(line.c_cc[VMIN], 0);
+  EXPECT_EQ(line.c_cc[VTIME], 0);
+  EXPECT_NE(fcntl(port.fd(), F_GETFD) & FD_CLOEXEC, 0);
+  EXPECT_NE(fcntl(port.fd(), F_GETFL) & O_NONBLOCK, 0);
+}
+
+TEST(SerialPort, CarriesEveryByteValueBothWays) {
+  FarEnd far(own_link());
+  SerialPort port({far.path(), 115200});
+  std::array<std::uint8_t, 256> all{};
+  for (std::size_t i = 0; i < all.size(); ++i) all[i] = static_cast<std::uint8_t>(i);
+
+  ASSERT_EQ(::write(far.fd(), all.data(), all.size()), 256);
+  std::vector<std::uint8_t> got;
+  ASSERT_TRUE(eventually([&] {
+    std::array<std::uint8_t, 64> piece{};
+    const IoResult result = port.read(piece);
+    got.insert(got.end(), piece.begin(), piece.begin() + static_cast<std::ptrdiff_t>(result.bytes));
+    return got.size() >= all.size();
+  }));
+  EXPECT_TRUE(std::equal(all.begin(), all.end(), got.begin(), got.end()));
+
+  const IoResult sent = port.write(all);
+  EXPECT_EQ(sent.status, IoStatus::kOk);
+  ASSERT_EQ(sent.bytes, all.size());
+  std::array<std::uint8_t, 512> back{};
+  std::size_t n = 0;
+  while (n < all.size()) {
+    const ssize_t k = ::read(far.fd(), back.data() + n, back.size() - n);
+    ASSERT_GT(k, 0);
+    n += static_cast<std::size_t>(k);
+  }
+  EXPECT_TRUE(std::equal(all.begin(), all.end(), back.begin()));
+  EXPECT_GE(port.pending_output_bytes(), 0);
+}
+
+TEST(SerialPort, AnEmptyLineIsNotADeadOne) {
+  FarEnd far(own_link());
+  SerialPort port({far.path(), 115200});
+  std::array<std::uint8_t, 8> buffer{};
+  EXPECT_EQ(port.read(buffer).status, IoStatus::kWouldBlock);
+  EXPECT_FALSE(port.wait_readable(rt::now() + 2 * kMillisecond));
+  EXPECT_FALSE(port.wait_readable(rt::now() - kSecond));
+}
+
+TEST(SerialPort, WakesWhenBytesArrive) {
+  FarEnd far(own_link());
+  SerialPort port({far.path(), 115200});
+  std::thread sender([&far] {
+    rt::sleep_until(rt::now() + 10 * kMillisecond);
+    EXPECT_EQ(::write(far.fd(), "x", 1), 1);
+  });
+  EXPECT_TRUE(port.wait_readable(rt::now() + 10 * kSecond));
+  sender.join();
+  std::array<std::uint8_t, 8> buffer{};
+  EXPECT_EQ(port.read(buffer).bytes, 1u);
+}
+
+/// Nobody reads: the line fills, a write is cut short, then none fits; nothing blocks and no byte is lost or doubled.
+TEST(SerialPort, WritesInPartsWhenTheLineIsFull) {
+  FarEnd far(own_link());
+  SerialPort port({far.path(), 115200});
+  std::vector<std::uint8_t> block(3000);
+  std::size_t accepted = 0, tries = 0;
+  bool cut_short = false;
+  std::uint8_t value = 0;
+  IoResult result{IoStatus::kOk, 0};
+  while (result.status == IoStatus::kOk && ++tries < 10'000) {
+    for (std::size_t i = 0; i < block.size(); ++i) block[i] = static_cast<std::uint8_t>(value + i);
+    result = port.write(block);
+    cut_short = cut_short || (result.bytes > 0 && result.bytes < block.size());
+    value = static_cast<std::uint8_t>(value + result.bytes);
+    accepted += result.bytes;
+  }
+  EXPECT_EQ(result.status, IoStatus::kWouldBlock);
+  EXPECT_TRUE(cut_short);
+
+  ASSERT_EQ(fcntl(far.fd(), F_SETFL, O_NONBLOCK), 0);
+  std::size_t arrived = 0;
+  ASSERT_TRUE(eventually([&] {
+    std::array<std::uint8_t, 4096> buffer{};
+    const ssize_t n = ::read(far.fd(), buffer.data(), buffer.size());
+    for (ssize_t i = 0; i < n; ++i, ++arrived)
+      EXPECT_EQ(buffer[static_cast<std::size_t>(i)], static_cast<std::uint8_t>(arrived));
+    return arrived >= accepted;
+  }));
+  EXPECT_EQ(arrived, accepted);
+  EXPECT_EQ(port.write(block).status, IoStatus::kOk);
+}
+
+TEST(SerialPort, NoticesHangUpAndComesBackUnderTheSamePath) {
+  FarEnd far(own_link());
+  SerialPort port({far.path(), 115200});
+  const int fd = port.fd();
+  std::array<std::uint8_t, 8> buffer{};
+  for (int round = 0; round < 3; ++round) {
+    far.unplug();
+    EXPECT_TRUE(port.wait_readable(rt::now() + kSecond));
+    EXPECT_EQ(port.read(buffer).status, IoStatus::kGone);
+    EXPECT_EQ(port.write(buffer).status, IoStatus::kGone);
+    EXPECT_FALSE(port.try_reopen());  // the path leads nowhere
+    EXPECT_EQ(port.last_error(), ENOENT);
+    EXPECT_EQ(port.read(buffer).status, IoStatus::kGone);
+    EXPECT_EQ(port.write(buffer).status, IoStatus::kGone);
+    EXPECT_EQ(port.pending_output_bytes(), -1);
+
+    far.plug_in();
+    ASSERT_TRUE(port.try_reopen());
+    EXPECT_EQ(port.fd(), fd);
+    EXPECT_EQ(port.read(buffer).status, IoStatus::kWouldBlock);
+    ASSERT_EQ(::write(far.fd(), "abc", 3), 3);
+    EXPECT_TRUE(port.wait_readable(rt::now() + kSecond));
+    EXPECT_EQ(port.read(buffer).bytes, 3u);
+    EXPECT_EQ(port.write(std::span(buffer).first(3)).bytes, 3u);
+  }
+}
+
+TEST(SerialPort, LetsTheDeviceGoOnRelease) {
+  FarEnd far(own_link());
+  SerialPort port({far.path(), 115200});
+  EXPECT_THROW(SerialPort({far.path(), 115200}), std::runtime_error) << "exclusive use";
+  port.release();
+  EXPECT_EQ(port.write(std::array<std::uint8_t, 1>{1}).status, IoStatus::kGone);
+  { SerialPort other({far.path(), 115200}); }
+}
+
+TEST(SerialPort, StaleInputIsDiscardedOnOpening) {
+  FarEnd far(own_link());
+  int keeper = ::open(far.path().c_str(), O_RDWR | O_NOCTTY);
+  ASSERT_GE(keeper, 0);
+  ASSERT_EQ(::write(far.fd(), "old\n", 4), 4);
+  SerialPort port({far.path(), 115200});
+  std::array<std::uint8_t, 8> buffer{};
+  EXPECT_EQ(port.read(buffer).status, IoStatus::kWouldBlock);
+  ::close(keeper);
+}
+
+}  // namespace
+}  // namespace wasp::drivers

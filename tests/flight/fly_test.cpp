@@ -1,0 +1,203 @@
+// The programs as a user runs them. No bound on time or accuracy here (the host may be slow): what must come out, comes
+// out, and what must be refused, is refused by name. Accuracy is judged on virtual time in lockstep_hover_test.cpp.
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "drivers/image_file.h"
+#include "shm/region.h"
+#include "tests/tools/program.h"
+#include "tools/csv_table.h"
+
+namespace wasp::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+const std::string kWasp = program_path("wasp");
+
+/// A unique run name: regions in shared memory carry it.
+std::string unique(const std::string& stem) { return stem + "-" + std::to_string(getpid()); }
+
+std::string fly(const TemporaryFolder& out, const std::string& name, const std::string& options) {
+  return kWasp + " fly --no-rt --out " + out.path.string() + " --name " + name + " " + options + " 2>&1";
+}
+
+/// Cues by behaviour and frame: everything the step said, as text to the bit.
+std::map<std::string, std::string> cue_bodies(const fs::path& csv) {
+  std::map<std::string, std::string> bodies;
+  const auto table = tools::CsvTable::read(csv);
+  if (!table) return bodies;
+  const std::size_t name = *table->column("behaviour"), frame = *table->column("frame_sequence");
+  const std::size_t first = *table->column("validity"), last = *table->column("detail_7");
+  for (std::size_t r = 0; r < table->rows(); ++r) {
+    std::string body;
+    for (std::size_t c = first; c <= last; ++c) body += std::string(table->text(r, c)) + ",";
+    bodies[std::string(table->text(r, name)) + "#" + std::string(table->text(r, frame))] = body;
+  }
+  return bodies;
+}
+
+TEST(Fly, RecordsReportsAndItsReplayGivesTheSameCuesToTheBit) {
+  TemporaryFolder out;
+  const std::string name = unique("rec"), again = unique("rep");
+  const auto [text, code] = run_shell(fly(out, name, "--seconds 5 --record --json"));
+  const fs::path run = out.path / name;
+  ASSERT_TRUE(fs::exists(run / "report.html")) << text;
+  EXPECT_NE(read_text(run / "report.html").find("<svg"), std::string::npos);
+  const auto document = nlohmann::json::parse(read_text(run / "run.json"));
+  EXPECT_FALSE(document["real_time"].get<bool>());
+  EXPECT_FALSE(document["kernel"].get<std::string>().empty());
+  std::istringstream lines(text);
+  int objects = 0;
+  for (std::string line; std::getline(lines, line);)
+    if (line.starts_with("{")) {
+      const auto result = nlohmann::json::parse(line);
+      for (const char* key : {"name", "value", "unit", "bar", "ok"}) EXPECT_TRUE(result.contains(key)) << line;
+      ++objects;
+    }
+  EXPECT_GT(objects, 5);
+
+  const auto live = cue_bodies(run / "recording/cues.csv");
+  ASSERT_GT(live.size(), 50u);
+  const auto lost = nlohmann::json::parse(read_text(run / "log/record.json"));
+  run_shell(fly(out, again, "--replay " + (run / "recording").string()));
+  const auto replayed = cue_bodies(out.path / again / "log/cues.csv");
+  // What the recorder lost (it says so) cannot be replayed; without loss every cue must come back to the bit.
+  std::uint64_t lost_count = 0;
+  for (const auto& topic : lost["topics"]) lost_count += topic["lost"].get<std::uint64_t>() + topic["before_attach"].get<std::uint64_t>();
+  if (lost_count > 0) GTEST_SKIP() << "the recorder lost " << lost_count << " samples on this busy host: " << lost.dump();
+  EXPECT_EQ(live, replayed);
+}
+
+TEST(Fly, InterruptLandsInOrderAndStillWritesTheReport) {
+  TemporaryFolder out;
+  const std::string name = unique("int");
+  Program program({kWasp, "fly", "--no-rt", "--json", "--out", out.path.string(), "--name", name, "--seconds", "600"});
+  const fs::path commands = out.path / name / "log/commands.csv";
+  const auto hovering = [&] { return read_text(commands).find(",behaviour,") != std::string::npos; };
+  ASSERT_TRUE(eventually(hovering));
+  program.signal(SIGINT);
+  program.wait();
+  ASSERT_TRUE(fs::exists(out.path / name / "report.html"));
+  const auto document = nlohmann::json::parse(read_text(out.path / name / "run.json"));
+  EXPECT_NE(document["exit_reason"].get<std::string>().find("interrupted"), std::string::npos);
+  EXPECT_NE(read_text(out.path / name / "log/flight.txt").find("mission flown to its end"), std::string::npos);
+}
+
+TEST(Fly, RealTimeThreadsAllocateNothingAndKeepToTheirSystemCalls) {
+  TemporaryFolder out;
+  const std::string name = unique("strict");
+  const std::string guard = std::string("LD_PRELOAD=") + WASP_BINARY_DIR + "/lib/libwasp_malloc_guard.so WASP_MALLOC_GUARD_OUT=" + (out.path / "guard.txt").string();
+  const auto [text, code] = run_shell(guard + " " + fly(out, name, "--seconds 4 --strict-syscalls"));
+  const std::string log = read_text(out.path / name / "log/flight.txt");
+  EXPECT_NE(log.find("mission flown to its end"), std::string::npos) << text << log;  // SIGSYS would have ended it
+  const std::string guarded = read_text(out.path / "guard.txt");  // written by the one program with real-time code
+  ASSERT_FALSE(guarded.empty());
+  EXPECT_EQ(guarded.find("violations 0"), 0u) << guarded;
+}
+
+TEST(Fly, TheShippedExampleIsMadeByOurSimulatorAndReplays) {
+  TemporaryFolder out;
+  const auto [text, code] = run_shell(fly(out, unique("ex"), "--replay example --seconds 3"));
+  EXPECT_TRUE(fs::exists(out.path / "example/recording/depth.txt")) << text;
+  EXPECT_NE(text.find("tum"), std::string::npos) << text;
+}
+
+class RealRecording : public ::testing::TestWithParam<const char*> {};
+
+TEST_P(RealRecording, Replays) {
+  const fs::path folder = fs::path(WASP_SOURCE_DIR) / "../shared/data" / GetParam();
+  if (!fs::exists(folder)) GTEST_SKIP() << "no recording at " << folder;
+  TemporaryFolder out;
+  std::string leaf = GetParam();
+  std::replace(leaf.begin(), leaf.end(), '/', '-');
+  const std::string name = unique(leaf);
+  const auto [text, code] = run_shell(fly(out, name, "--seconds 3 --replay " + folder.string()));
+  const std::string log = read_text(out.path / name / "log/flight.txt");
+  EXPECT_NE(log.find("mission flown to its end"), std::string::npos) << text << log;
+  const auto cues = tools::CsvTable::read(out.path / name / "log/cues.csv");
+  ASSERT_TRUE(cues.has_value());
+  EXPECT_GT(cues->rows(), 20u);
+  const auto commands = tools::CsvTable::read(out.path / name / "log/commands.csv");
+  ASSERT_TRUE(commands.has_value());
+  EXPECT_GT(commands->rows(), 20u);
+}
+
+INSTANTIATE_TEST_SUITE_P(Data, RealRecording,
+                         ::testing::Values("kinect_7scenes_redkitchen", "kinect_floor_pcl", "rgbd_tum_pair",
+                                           "hover_mocap/climb", "hover_mocap/descend"),
+                         [](const auto& param) {
+                           std::string name = param.param;
+                           std::replace(name.begin(), name.end(), '/', '_');
+                           return name;
+                         });
+
+/// Runs a command line that must fail and say why.
+void expect_refusal(const std::string& command, const std::string& word) {
+  const auto [text, code] = run_shell(command);
+  EXPECT_NE(code, 0) << command << "\n" << text;
+  EXPECT_LT(code, 128) << command << "\n" << text;
+  EXPECT_NE(text.find(word), std::string::npos) << command << "\n" << text;
+}
+
+TEST(FlyRefuses, WhatCannotBeFlown) {
+  TemporaryFolder out;
+  expect_refusal(fly(out, "a", "--replay /nowhere/at/all"), "/nowhere/at/all");
+  expect_refusal(fly(out, "a", "--mission teleport"), "teleport");
+  expect_refusal(fly(out, "a/../b", ""), "--name");
+  expect_refusal(fly(out, "a", "--seconds -3"), "--seconds");
+  expect_refusal(kWasp + " dance 2>&1", "dance");
+  expect_refusal(kWasp + " flight --no-rt --instance x --config /nowhere.toml 2>&1", "/nowhere.toml");
+}
+
+TEST(FlyRefuses, AConfigurationWithAnUnknownKeyOrAnImpossibleValue) {
+  TemporaryFolder out;
+  const fs::path config = out.path / "bad.toml";
+  std::ofstream(config) << "[control]\nturbo = true\n";
+  expect_refusal(fly(out, unique("bad"), "--seconds 2 --config " + config.string()), "turbo");
+  std::ofstream(config) << "[threads.control]\npriority = 400\n";
+  expect_refusal(fly(out, unique("bad2"), "--seconds 2 --config " + config.string()), "400");
+}
+
+TEST(FlyRefuses, ToOverwriteAnEarlierRun) {
+  TemporaryFolder out;
+  fs::create_directories(out.path / "taken/log");
+  std::ofstream(out.path / "taken/run.json") << "precious";
+  expect_refusal(fly(out, "taken", "--seconds 2"), "nothing is overwritten");
+  EXPECT_EQ(read_text(out.path / "taken/run.json"), "precious");
+}
+
+TEST(FlyRefuses, ATruncatedRecording) {
+  TemporaryFolder out;
+  const fs::path folder = out.path / "broken";
+  fs::create_directories(folder / "depth");
+  std::ofstream(folder / "depth.txt") << "0.0 depth/0.png\n";
+  std::ofstream(folder / "depth/0.png") << "\x89PNG\r\n";
+  expect_refusal(fly(out, unique("broken"), "--replay " + folder.string()), "0.png");
+}
+
+TEST(FlyRefuses, ASerialLineThatIsNotThere) {
+  TemporaryFolder out;
+  std::ofstream(out.path / "c.toml") << "[autopilot]\nendpoint = \"serial:/dev/nothing-here:57600\"\n";
+  expect_refusal(kWasp + " flight --no-rt --instance " + unique("line") + " --config " + (out.path / "c.toml").string() + " 2>&1", "/dev/nothing-here");
+  std::ofstream(out.path / "c.toml") << "[autopilot]\nendpoint = \"serial:/dev/null:1234\"\n";
+  expect_refusal(kWasp + " flight --no-rt --instance " + unique("line") + " --config " + (out.path / "c.toml").string() + " 2>&1", "1234");
+}
+
+TEST(Fly, TheSimulatorDyingIsSaidAndTheReportIsStillWritten) {
+  TemporaryFolder out;
+  const std::string name = unique("simdies");
+  Program program({kWasp, "fly", "--no-rt", "--json", "--out", out.path.string(), "--name", name, "--seconds", "600"});
+  ASSERT_TRUE(eventually([&] { return read_text(out.path / name / "log/commands.csv").find(",behaviour,") != std::string::npos; }));
+  run_shell("pkill -KILL -f -- 'wasp-sim --instance " + name + " '");
+  EXPECT_NE(program.wait(), 0);
+  EXPECT_TRUE(fs::exists(out.path / name / "report.html"));
+  for (const auto& region : shm::Region::list("wasp." + name)) ADD_FAILURE() << "left behind: " << region;
+}
+
+}  // namespace
+}  // namespace wasp::test

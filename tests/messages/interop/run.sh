@@ -1,0 +1,18 @@
+#!/bin/sh
+# Runs the comparison with node-mavlink: run.sh SOURCE_FOLDER NODE_FOLDER FRAMES_PROGRAM. Exits with 77 (skipped) only
+# where node is absent; a failed installation is a failure.
+set -eu
+source_folder=$1 node_folder=$2 program=$3
+if ! command -v node > /dev/null || ! command -v npm > /dev/null; then
+  echo "skipped: node and npm are not installed"
+  exit 77
+fi
+mkdir -p "$node_folder"
+if ! cmp -s "$source_folder/package.json" "$node_folder/installed.json"; then
+  cp "$source_folder/package.json" "$node_folder/package.json"
+  npm install --no-package-lock --no-audit --no-fund --ignore-scripts --prefix "$node_folder"
+  cp "$source_folder/package.json" "$node_folder/installed.json"
+fi
+for seed in 1 2 3; do
+  node "$source_folder/interop.cjs" "$node_folder" "$program" "$seed" 40
+done
