@@ -113,7 +113,7 @@ std::vector<std::string> flight_arguments(const Run& run) {
   a.insert(a.end(), {"--config", (run.folder / "override.toml").string()});
   if (!run.real_time) a.push_back("--no-rt");
   if (!run.options.replay.empty())
-    a.insert(a.end(), {"--replay", run.options.replay, "--seconds", fmt::format("{:.3f}", run.flight_seconds)});
+    a.insert(a.end(), {"--replay", run.options.replay, "--seconds", fmt::format("{}", run.options.seconds)});
   return a;
 }
 

@@ -81,7 +81,7 @@ TEST(ControlStep, StopStreamFailsafeSendsNothing) {
 
 /// A float of any bit pattern, so NaN, infinities and denormals come too.
 float any_float(std::mt19937& random) {
-  const std::uint32_t bits = random();
+  const auto bits = static_cast<std::uint32_t>(random());
   float f;
   std::memcpy(&f, &bits, sizeof f);
   return f;
