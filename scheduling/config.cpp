@@ -105,6 +105,7 @@ void read_behaviours(TomlTable t, Config& c) {
     b.number("height_rank", row.height_rank, -1, 15);
     b.number("heading_weight", row.heading_weight, 0, 100);
     b.number("pitch_weight", row.pitch_weight, 0, 100);
+    c.behaviour_params[i].merge(b.table("params"));
     b.finish();
   }
   t.finish();
@@ -134,6 +135,7 @@ Config load_config(const std::vector<std::string>& paths, const std::vector<std:
   Config config;
   if (behaviour_names.size() > control::kMaxBehaviours) throw ConfigError("too many behaviours");
   for (const auto& name : behaviour_names) config.behaviours.push_back({name, 1, 50, 4 * kMillisecond});
+  config.behaviour_params.assign(behaviour_names.size(), TomlTable(toml::table{}));
   config.control.arbiter.behaviour_count = static_cast<int>(behaviour_names.size());
   for (const auto& path : paths) read_file(path, config);
   if (config.control.mission.leg_count == 0) {

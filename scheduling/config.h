@@ -41,6 +41,7 @@ struct Config {
   ThreadRow link_thread{"link", 1, 70, 1 * kMillisecond};
   ThreadRow camera_thread{"camera", 1, 60, 5 * kMillisecond};
   std::vector<ThreadRow> behaviours;  ///< index = Cue::behaviour
+  std::vector<TomlTable> behaviour_params;  ///< [behaviour.NAME.params], checked by the behaviour's own list
 };
 
 /// Reads `paths` in order, later ones override single keys. `behaviour_names` are the behaviours this program has, in

@@ -116,7 +116,7 @@ class Flight {
           w.script_ends_at = second_lap_;
         }
       }
-      bodies_.push_back(row.make(config_.camera, w));
+      bodies_.push_back(row.make(config_.camera, config_.behaviour_params[i], w));
     }
     link_ = std::make_unique<LinkLoop>(flight_, port_, autopilot_, stages_, report_, link_events_);
     control_loop_ = std::make_unique<ControlLoop>(config_, ControlWiring{&flight_, &stages_, &report_, &port_, &autopilot_, &control_events_});

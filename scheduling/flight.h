@@ -14,16 +14,18 @@ namespace wasp::scheduling {
 struct BehaviourRow {
   std::string name;
   Stream stream;
-  /// Builds the adaptor (before arming); the result is the body of its thread.
-  std::function<std::function<void(LoopControl&)>(const CameraGeometry&, const BehaviourWiring&)> make;
+  /// Builds the adaptor (before arming) with its parameters from the configuration; the result is its thread's body.
+  std::function<std::function<void(LoopControl&)>(const CameraGeometry&, TomlTable params, const BehaviourWiring&)> make;
 };
 using BehaviourTable = std::vector<BehaviourRow>;
 
 template <Behaviour B>
 BehaviourRow behaviour_row() {
-  return {std::string(B::kName), B::kStream, [](const CameraGeometry& camera, const BehaviourWiring& wiring) {
+  return {std::string(B::kName), B::kStream, [](const CameraGeometry& camera, TomlTable table, const BehaviourWiring& wiring) {
             typename B::Params params;
             params.camera = camera;
+            B::visit_params(params, [&](const char* key, auto& field, double low, double high) { table.number(key, field, low, high); });
+            table.finish();
             auto loop = std::make_shared<BehaviourLoop<B>>(params, wiring);
             return [loop](LoopControl& control) { loop->run(control); };
           }};

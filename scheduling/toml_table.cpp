@@ -70,11 +70,8 @@ TomlTable TomlTable::table(const char* key) {
   return TomlTable(*v);
 }
 
-std::vector<std::string> TomlTable::keys() const {
-  std::vector<std::string> names;
-  if (value_.is_table())
-    for (const auto& [key, value] : value_.as_table()) names.push_back(key);
-  return names;
+void TomlTable::merge(const TomlTable& later) {
+  for (const auto& [key, value] : later.value_.as_table()) value_.as_table()[key] = value;
 }
 
 void TomlTable::finish() const {

@@ -41,8 +41,8 @@ class TomlTable {
   void numbers(const char* key, std::vector<double>& out, double low, double high);
   /// Child table; an empty one if absent.
   TomlTable table(const char* key);
-  /// Names of the keys of this table.
-  [[nodiscard]] std::vector<std::string> keys() const;
+  /// Takes over every key of `later`, which wins.
+  void merge(const TomlTable& later);
   /// Throws if the table holds a key nobody asked for.
   void finish() const;
 

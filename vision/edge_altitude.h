@@ -27,6 +27,17 @@ struct EdgeAltitude {
     float smoothing_s = 0.3f;  ///< time constant of the low pass; 0: none
   };
 
+  /// What a configuration may set: visit(key, field, least, greatest).
+  template <class Visitor>
+  static void visit_params(Params& p, Visitor&& visit) {
+    visit("edges_per_m", p.height.edges_per_m, 0.01, 1000.0);
+    visit("resolution_px", p.height.resolution_px, 0.5, 20.0);
+    visit("edge_thickness_px", p.height.edge_thickness_px, 1.0, 20.0);
+    visit("min_threshold", p.min_threshold, 0, 1020);
+    visit("max_misfit", p.max_misfit, 0.01, 1.0);
+    visit("smoothing_s", p.smoothing_s, 0.0, 10.0);
+  }
+
   /// The filter's memory: what it last said and when.
   struct State {
     TimeNs filtered_at_ns = kNever;

@@ -29,6 +29,16 @@ struct GroundAltitude {
     float max_height_m = 10.f;                 ///< estimates above are refused
   };
 
+  /// What a configuration may set: visit(key, field, least, greatest).
+  template <class Visitor>
+  static void visit_params(Params& p, Visitor&& visit) {
+    visit("max_slope_rad", p.max_slope_rad, 0.0, 0.8);
+    visit("attitude_tolerance_rad", p.attitude_tolerance_rad, 0.0, 0.5);
+    visit("max_tilt_no_attitude_rad", p.max_tilt_no_attitude_rad, 0.0, 1.5);
+    visit("scale_sigma", p.scale_sigma, 0.0, 0.2);
+    visit("max_height_m", p.max_height_m, 0.5, 100.0);
+  }
+
   struct State {
     DepthPlaneState plane;
   };

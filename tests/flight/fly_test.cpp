@@ -159,6 +159,8 @@ TEST(FlyRefuses, AConfigurationWithAnUnknownKeyOrAnImpossibleValue) {
   const fs::path config = out.path / "bad.toml";
   std::ofstream(config) << "[control]\nturbo = true\n";
   expect_refusal(fly(out, unique("bad"), "--seconds 2 --config " + config.string()), "turbo");
+  std::ofstream(config) << "[behaviour.edge_altitude.params]\nedges_per_mile = 3\n";
+  expect_refusal(fly(out, unique("bad3"), "--seconds 2 --config " + config.string()), "edges_per_mile");
   std::ofstream(config) << "[threads.control]\npriority = 400\n";
   expect_refusal(fly(out, unique("bad2"), "--seconds 2 --config " + config.string()), "400");
 }

@@ -1,0 +1,88 @@
+// The hover bar on virtual time, where no host can disturb it: the same step functions, the same bytes, other seeds.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "sim/lockstep.h"
+
+namespace wasp::sim {
+namespace {
+
+control::ControlParams hover(float seconds) {
+  control::ControlParams p;
+  p.arbiter.behaviour_count = 2;
+  p.arbiter.rows[0].height_rank = 0;
+  p.mission.leg_count = 2;
+  p.mission.legs = {control::HoverLeg{0.5f, seconds}, control::HoverLeg{1.0f, seconds}};
+  return p;
+}
+
+LockstepOptions options(std::uint32_t seed, float seconds) {
+  LockstepOptions o;
+  o.sim.seed = seed;
+  o.control = hover(seconds);
+  return o;
+}
+
+struct Errors {
+  double rms_m = 0, worst_m = 0;
+  int n = 0;
+};
+
+/// Height errors against truth from 5 s after the start of a leg.
+Errors errors_of(const std::vector<LockstepSample>& samples, int leg, double setpoint_m) {
+  Errors e;
+  TimeNs start_ns = kNever;
+  for (const auto& s : samples) {
+    if (control::leg_of(static_cast<control::MissionPhase>(s.command.mission_phase)) != leg) continue;
+    if (start_ns == kNever) start_ns = s.at_ns;
+    if (s.at_ns - start_ns < 5 * kSecond) continue;
+    const double error_m = static_cast<double>(s.truth.height_m) - setpoint_m;
+    e.rms_m += error_m * error_m;
+    e.worst_m = std::max(e.worst_m, std::fabs(error_m));
+    ++e.n;
+  }
+  e.rms_m = std::sqrt(e.rms_m / std::max(1, e.n));
+  return e;
+}
+
+class LockstepHover : public ::testing::TestWithParam<std::uint32_t> {};
+
+TEST_P(LockstepHover, HoldsBothHeightsWithinTheBar) {
+  const auto samples = Lockstep(options(GetParam(), 12.f)).fly(60);
+  ASSERT_FALSE(samples.empty());
+  EXPECT_EQ(static_cast<control::MissionPhase>(samples.back().command.mission_phase), control::MissionPhase::kDone);
+  for (const auto& [leg, setpoint_m] : {std::pair{0, 0.5}, std::pair{1, 1.0}}) {
+    const Errors e = errors_of(samples, leg, setpoint_m);
+    ASSERT_GT(e.n, 100);
+    RecordProperty("rms_mm_" + std::to_string(leg), static_cast<int>(e.rms_m * 1000));
+    EXPECT_LE(e.rms_m, 0.05) << "leg " << leg;
+    EXPECT_LE(e.worst_m, 0.15) << "leg " << leg;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Seeds, LockstepHover, ::testing::Values(1u, 77u, 2026u));
+
+TEST(Lockstep, SameSeedSameFlightToTheBit) {
+  const auto a = Lockstep(options(5, 2.f)).fly(10), b = Lockstep(options(5, 2.f)).fly(10);
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    ASSERT_EQ(a[i].truth.position_ned_m, b[i].truth.position_ned_m) << i;
+    ASSERT_EQ(a[i].command.thrust, b[i].command.thrust) << i;
+    ASSERT_EQ(a[i].ground.height_m, b[i].ground.height_m) << i;
+  }
+}
+
+TEST(Lockstep, BlindItHoldsThenDescends) {
+  LockstepOptions o = options(3, 5.f);
+  o.sim.sensor.max_range_m = 0.41f;  // the sensor sees nothing from the air
+  o.control.mission.patience_s = 5;
+  const auto samples = Lockstep(o).fly(10);
+  ASSERT_FALSE(samples.empty());
+  EXPECT_EQ(static_cast<control::MissionPhase>(samples.back().command.mission_phase), control::MissionPhase::kBroken);
+  for (const auto& s : samples) EXPECT_EQ(s.command.thrust, 0.f);  // it never left the ground
+}
+
+}  // namespace
+}  // namespace wasp::sim
