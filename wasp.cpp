@@ -37,7 +37,8 @@ constexpr const char* kUsage =
     "  bench    benchmarks: ipc, vision, micro\n";
 
 int run_sister(const char* name, char** argv) {
-  const std::string program = (std::filesystem::read_symlink("/proc/self/exe").parent_path() / (std::string("wasp-") + name)).string();
+  const std::string program =
+      (std::filesystem::read_symlink("/proc/self/exe").parent_path() / (std::string("wasp-") + name)).string();
   execv(program.c_str(), argv);
   std::fprintf(stderr, "wasp: no subcommand '%s' (%s: %s)\n%s", name, program.c_str(), std::strerror(errno), kUsage);
   return 2;

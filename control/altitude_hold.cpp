@@ -12,8 +12,8 @@ float hover_thrust(const AltitudeHoldParams& p, float cos_tilt) noexcept {
   return std::min(1.f, p.mass_kg * kGravity_mps2 / (p.full_thrust_n * std::max(cos_tilt, kLeastCosTilt)));
 }
 
-float altitude_hold_step(const AltitudeHoldParams& p, float target_m, float height_m, float climb_rate_mps, float cos_tilt,
-                         float dt_s, AltitudeHoldState& s) noexcept {
+float altitude_hold_step(const AltitudeHoldParams& p, float target_m, float height_m, float climb_rate_mps,
+                         float cos_tilt, float dt_s, AltitudeHoldState& s) noexcept {
   if (!s.engaged) {
     s = AltitudeHoldState{};
     s.setpoint_m = height_m;
@@ -23,7 +23,8 @@ float altitude_hold_step(const AltitudeHoldParams& p, float target_m, float heig
   s.setpoint_m += step_m;
   const PidParams pid{p.kp_npm, p.ki_npms, p.kd_nspm, -p.max_correction_n, p.max_correction_n};
   const float correction_n = pid_step(pid, s.setpoint_m - height_m, step_m / dt_s - climb_rate_mps, dt_s, s.pid);
-  return std::clamp(hover_thrust(p, cos_tilt) + correction_n / (p.full_thrust_n * std::max(cos_tilt, kLeastCosTilt)), 0.f, 1.f);
+  return std::clamp(hover_thrust(p, cos_tilt) + correction_n / (p.full_thrust_n * std::max(cos_tilt, kLeastCosTilt)),
+                    0.f, 1.f);
 }
 
 }  // namespace wasp::control

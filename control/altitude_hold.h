@@ -8,13 +8,13 @@
 namespace wasp::control {
 
 struct AltitudeHoldParams {
-  float mass_kg = 1.925f;           ///< wasp Kontron Kinect (table A.4)
-  float full_thrust_n = 22.4f;      ///< 4 rotors x 5.6 N
-  float kp_npm = 5.f;               ///< [N/m]
-  float ki_npms = 1.f;              ///< [N/(m s)]
-  float kd_nspm = 6.f;              ///< [N s/m]
-  float max_climb_mps = 0.4f;       ///< slope of the setpoint ramp
-  float max_correction_n = 3.f;     ///< limit of the PID output around the weight
+  float mass_kg = 1.925f;        ///< wasp Kontron Kinect (table A.4)
+  float full_thrust_n = 22.4f;   ///< 4 rotors x 5.6 N
+  float kp_npm = 5.f;            ///< [N/m]
+  float ki_npms = 1.f;           ///< [N/(m s)]
+  float kd_nspm = 6.f;           ///< [N s/m]
+  float max_climb_mps = 0.4f;    ///< slope of the setpoint ramp
+  float max_correction_n = 3.f;  ///< limit of the PID output around the weight
 };
 
 struct AltitudeHoldState {

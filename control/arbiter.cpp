@@ -15,9 +15,10 @@ void note_evidence(Intention& intention, const Cue& cue) noexcept {
 
 bool usable(const Cue& cue, const ArbiterRow& row, TimeNs now_ns) noexcept {
   const CueBody& b = cue.body;
-  const bool finite = std::isfinite(b.height_m) && std::isfinite(b.height_sigma_m) && std::isfinite(b.heading_rate_radps) &&
-                      std::isfinite(b.pitch_rad);
-  return finite && b.validity == Validity::kValid && cue.over_budget == 0 && now_ns - cue.exposed_at_ns <= row.age_limit_ns;
+  const bool finite = std::isfinite(b.height_m) && std::isfinite(b.height_sigma_m) &&
+                      std::isfinite(b.heading_rate_radps) && std::isfinite(b.pitch_rad);
+  return finite && b.validity == Validity::kValid && cue.over_budget == 0 &&
+         now_ns - cue.exposed_at_ns <= row.age_limit_ns;
 }
 
 Intention arbitrate(const ArbiterParams& params, const CueSet& set, TimeNs now_ns) noexcept {

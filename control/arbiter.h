@@ -14,9 +14,9 @@ inline constexpr int kMaxBehaviours = 16;
 /// How the arbiter treats one behaviour; row i belongs to Cue::behaviour == i.
 struct ArbiterRow {
   DurationNs age_limit_ns = 250 * kMillisecond;
-  int height_rank = -1;         ///< 0 is asked first; -1: never a height source
-  float heading_weight = 0.f;   ///< >= 0
-  float pitch_weight = 0.f;     ///< >= 0
+  int height_rank = -1;        ///< 0 is asked first; -1: never a height source
+  float heading_weight = 0.f;  ///< >= 0
+  float pitch_weight = 0.f;    ///< >= 0
 };
 
 struct ArbiterParams {
@@ -31,7 +31,7 @@ struct CueSet {
 };
 
 struct Intention {
-  int height_source = -1;            ///< behaviour index, -1: nobody can see the ground
+  int height_source = -1;  ///< behaviour index, -1: nobody can see the ground
   float height_m = 0;
   float height_sigma_m = 0;
   TimeNs height_exposed_at_ns = kNever;
@@ -41,7 +41,8 @@ struct Intention {
   TimeNs oldest_exposed_at_ns = kNever;  ///< oldest evidence in this intention
 };
 
-/// True if the cue may be used at `now_ns`: valid, finite, made within its budget and within its age limit. Realtime-safe: yes.
+/// True if the cue may be used at `now_ns`: valid, finite, made within its budget and within its age limit.
+/// Realtime-safe: yes.
 bool usable(const Cue& cue, const ArbiterRow& row, TimeNs now_ns) noexcept;
 
 /// Realtime-safe: yes.

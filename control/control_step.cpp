@@ -33,15 +33,16 @@ Situation assess(const ControlParams& p, const ControlInput& in, const Intention
   now.link_alive = in.autopilot.heard_at_ns != kNever && in.now_ns - in.autopilot.heard_at_ns <= p.link_age_limit_ns;
   now.attitude_fresh = in.attitude_present && in.now_ns - in.attitude.exposed_at_ns <= p.attitude_age_limit_ns;
   now.ground_seen = intention.height_source >= 0;
-  now.ground_lost_long = !now.ground_seen && (s.ground_seen_at_ns == kNever || in.now_ns - s.ground_seen_at_ns > p.ground_hold_limit_ns);
+  now.ground_lost_long =
+      !now.ground_seen && (s.ground_seen_at_ns == kNever || in.now_ns - s.ground_seen_at_ns > p.ground_hold_limit_ns);
   now.setpoint_finite = finite;
   now.deadlines_missed = in.deadlines_missed;
   return now;
 }
 
 /// What behaviours and mission together want, before limits and mode.
-Setpoint wanted_setpoint(const ControlParams& p, const ControlInput& in, const Intention& intention, const MissionWish& wish,
-                         ControlState& s) noexcept {
+Setpoint wanted_setpoint(const ControlParams& p, const ControlInput& in, const Intention& intention,
+                         const MissionWish& wish, ControlState& s) noexcept {
   Setpoint wanted;
   if (!wish.rotors) {
     s.altitude_hold.engaged = false;
@@ -49,8 +50,8 @@ Setpoint wanted_setpoint(const ControlParams& p, const ControlInput& in, const I
   }
   wanted.pitch_rad = intention.pitch_rad;
   wanted.yaw_rate_radps = intention.heading_rate_radps;
-  wanted.thrust = altitude_hold_step(p.altitude_hold, wish.target_m, s.height.height_m, s.height.climb_rate_mps, cos_tilt(in),
-                                     in.dt_s, s.altitude_hold);
+  wanted.thrust = altitude_hold_step(p.altitude_hold, wish.target_m, s.height.height_m, s.height.climb_rate_mps,
+                                     cos_tilt(in), in.dt_s, s.altitude_hold);
   return wanted;
 }
 
@@ -58,13 +59,19 @@ Setpoint wanted_setpoint(const ControlParams& p, const ControlInput& in, const I
 Setpoint by_mode(const ControlParams& p, const ControlInput& in, FlightMode mode, const Setpoint& wanted) noexcept {
   Setpoint neutral;
   switch (mode) {
-    case FlightMode::kBehaviour: return wanted;
-    case FlightMode::kHold: neutral.thrust = wanted.thrust; return neutral;
-    case FlightMode::kManual: neutral.thrust = hover_thrust(p.altitude_hold, cos_tilt(in)); return neutral;
+    case FlightMode::kBehaviour:
+      return wanted;
+    case FlightMode::kHold:
+      neutral.thrust = wanted.thrust;
+      return neutral;
+    case FlightMode::kManual:
+      neutral.thrust = hover_thrust(p.altitude_hold, cos_tilt(in));
+      return neutral;
     case FlightMode::kFailsafe:
       neutral.thrust = p.failsafe_thrust_share * hover_thrust(p.altitude_hold, cos_tilt(in));
       return neutral;
-    case FlightMode::kDisarmed: break;
+    case FlightMode::kDisarmed:
+      break;
   }
   return neutral;
 }
@@ -78,10 +85,11 @@ ControlOutput control_step(const ControlParams& p, const ControlInput& in, Contr
     s.ground_seen_at_ns = in.now_ns;
     correct(p.height_filter, intention.height_m, intention.height_exposed_at_ns, in.now_ns, s.height);
   }
-  const MissionWish wish = mission_step(p.mission,
-                                        {in.now_ns, in.autopilot.armed, in.autopilot.follows, intention.height_source >= 0,
-                                         s.height.height_m, s.height.climb_rate_mps, in.stop_requested},
-                                        s.mission);
+  const MissionWish wish =
+      mission_step(p.mission,
+                   {in.now_ns, in.autopilot.armed, in.autopilot.follows, intention.height_source >= 0,
+                    s.height.height_m, s.height.climb_rate_mps, in.stop_requested},
+                   s.mission);
   const Setpoint wanted = wanted_setpoint(p, in, intention, wish, s);
   Setpoint probe = s.sent;
   const bool finite = limit(p.limits, wanted, in.dt_s, probe);
@@ -93,8 +101,8 @@ ControlOutput control_step(const ControlParams& p, const ControlInput& in, Contr
 
   ControlOutput out;
   Command& c = out.command;
-  const Quat q = quat_from_euler({s.sent.roll_rad, s.sent.pitch_rad,
-                                  in.attitude_present ? euler_from_quat(attitude_of(in)).yaw_rad : 0.f});
+  const Quat q = quat_from_euler(
+      {s.sent.roll_rad, s.sent.pitch_rad, in.attitude_present ? euler_from_quat(attitude_of(in)).yaw_rad : 0.f});
   c.q_ned_body = {q.w(), q.x(), q.y(), q.z()};
   c.yaw_rate_radps = s.sent.yaw_rate_radps;
   c.thrust = s.sent.thrust;

@@ -1,5 +1,5 @@
-// One control period, pure: cues -> arbiter -> altitude hold -> limits -> flight mode -> one command. The real-time loop
-// and the lockstep simulation call this same function.
+// One control period, pure: cues -> arbiter -> altitude hold -> limits -> flight mode -> one command. The real-time
+// loop and the lockstep simulation call this same function.
 #pragma once
 
 #include "control/altitude_hold.h"
@@ -21,9 +21,9 @@ struct ControlParams {
   LimitParams limits;
   MissionParams mission;
   DurationNs attitude_age_limit_ns = 200 * kMillisecond;
-  DurationNs link_age_limit_ns = 300 * kMillisecond;   ///< silence after which the link counts as lost
-  DurationNs ground_hold_limit_ns = 1 * kSecond;       ///< how long to hold on the accelerometer alone
-  float failsafe_thrust_share = 0.96f;                 ///< of hover thrust: a gentle descent
+  DurationNs link_age_limit_ns = 300 * kMillisecond;  ///< silence after which the link counts as lost
+  DurationNs ground_hold_limit_ns = 1 * kSecond;      ///< how long to hold on the accelerometer alone
+  float failsafe_thrust_share = 0.96f;                ///< of hover thrust: a gentle descent
   FailsafeAction failsafe_action = FailsafeAction::kDescend;
 };
 
@@ -31,7 +31,7 @@ struct ControlParams {
 struct AutopilotState {
   TimeNs heard_at_ns = kNever;  ///< any valid frame
   bool armed = false;
-  bool follows = false;         ///< in the mode in which it obeys setpoints
+  bool follows = false;  ///< in the mode in which it obeys setpoints
 };
 
 struct ControlInput {

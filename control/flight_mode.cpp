@@ -12,10 +12,13 @@ struct Row {
 };
 
 constexpr std::array kRows = {
-    Row{[](const Situation& s) noexcept { return !s.autopilot_armed; }, FlightMode::kDisarmed, ModeReason::kMissionStep},
+    Row{[](const Situation& s) noexcept { return !s.autopilot_armed; }, FlightMode::kDisarmed,
+        ModeReason::kMissionStep},
     Row{[](const Situation& s) noexcept { return !s.link_alive; }, FlightMode::kFailsafe, ModeReason::kLinkLost},
-    Row{[](const Situation& s) noexcept { return !s.autopilot_follows; }, FlightMode::kManual, ModeReason::kAutopilotLeft},
-    Row{[](const Situation& s) noexcept { return !s.attitude_fresh; }, FlightMode::kFailsafe, ModeReason::kAttitudeLost},
+    Row{[](const Situation& s) noexcept { return !s.autopilot_follows; }, FlightMode::kManual,
+        ModeReason::kAutopilotLeft},
+    Row{[](const Situation& s) noexcept { return !s.attitude_fresh; }, FlightMode::kFailsafe,
+        ModeReason::kAttitudeLost},
     Row{[](const Situation& s) noexcept { return !s.setpoint_finite; }, FlightMode::kFailsafe, ModeReason::kNotFinite},
     Row{[](const Situation& s) noexcept { return s.ground_lost_long; }, FlightMode::kFailsafe, ModeReason::kCueLost},
     Row{[](const Situation& s) noexcept { return s.deadlines_missed; }, FlightMode::kHold, ModeReason::kDeadlineMissed},
@@ -42,9 +45,21 @@ const char* name_of(FlightMode mode) noexcept {
 }
 
 const char* name_of(ModeReason reason) noexcept {
-  constexpr std::array kNames = {"none", "start", "mission step", "ground lost", "ground seen again", "attitude lost",
-                                 "attitude back", "link lost", "link back", "pilot", "setpoint not finite",
-                                 "autopilot left our mode", "deadlines missed", "stop requested", "landed"};
+  constexpr std::array kNames = {"none",
+                                 "start",
+                                 "mission step",
+                                 "ground lost",
+                                 "ground seen again",
+                                 "attitude lost",
+                                 "attitude back",
+                                 "link lost",
+                                 "link back",
+                                 "pilot",
+                                 "setpoint not finite",
+                                 "autopilot left our mode",
+                                 "deadlines missed",
+                                 "stop requested",
+                                 "landed"};
   const auto i = static_cast<std::size_t>(reason);
   return i < kNames.size() ? kNames[i] : "unknown";
 }

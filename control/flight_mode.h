@@ -1,5 +1,5 @@
-// The flight mode has the last word. One table, read from the top each tick: the first row whose condition holds decides.
-// Every loss has a named response: see kRows in the source and docs/flight_modes.md.
+// The flight mode has the last word. One table, read from the top each tick: the first row whose condition holds
+// decides. Every loss has a named response: see kRows in the source and docs/flight_modes.md.
 #pragma once
 
 #include "types/messages.h"
@@ -9,13 +9,13 @@ namespace wasp::control {
 /// What is true at this tick.
 struct Situation {
   bool autopilot_armed = false;
-  bool autopilot_follows = false;   ///< it is in the mode in which it obeys setpoints
-  bool link_alive = false;          ///< heard from within the link age limit
+  bool autopilot_follows = false;  ///< it is in the mode in which it obeys setpoints
+  bool link_alive = false;         ///< heard from within the link age limit
   bool attitude_fresh = false;
-  bool ground_seen = false;         ///< a height source is usable
-  bool ground_lost_long = false;    ///< none was for longer than the hold limit
+  bool ground_seen = false;       ///< a height source is usable
+  bool ground_lost_long = false;  ///< none was for longer than the hold limit
   bool setpoint_finite = true;
-  bool deadlines_missed = false;    ///< two consecutive ticks
+  bool deadlines_missed = false;  ///< two consecutive ticks
 };
 
 struct ModeState {

@@ -48,7 +48,8 @@ void predict(const HeightFilterParams&, float accel_up_mps2, TimeNs now_ns, Heig
   if (!s.started) return;
   const auto dt_s = static_cast<float>(to_seconds(now_ns - s.at_ns));
   if (dt_s <= 0) return;
-  const float believable = std::isfinite(accel_up_mps2) ? std::clamp(accel_up_mps2, -kMaxAccel_mps2, kMaxAccel_mps2) : 0.f;
+  const float believable =
+      std::isfinite(accel_up_mps2) ? std::clamp(accel_up_mps2, -kMaxAccel_mps2, kMaxAccel_mps2) : 0.f;
   const float a = believable - s.accel_bias_mps2;
   s.height_m += s.climb_rate_mps * dt_s + 0.5f * a * dt_s * dt_s;
   s.climb_rate_mps += a * dt_s;

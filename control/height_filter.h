@@ -29,7 +29,8 @@ struct HeightFilterState {
   std::array<float, kHistory> history_height_m{};
 };
 
-/// Carries the estimate to `now_ns` under the upward acceleration `accel_up_mps2` (gravity removed). Realtime-safe: yes.
+/// Carries the estimate to `now_ns` under the upward acceleration `accel_up_mps2` (gravity removed). Realtime-safe:
+/// yes.
 void predict(const HeightFilterParams& params, float accel_up_mps2, TimeNs now_ns, HeightFilterState& state) noexcept;
 
 /// Corrects with a height seen at `exposed_at_ns`; an exposure not newer than the last is ignored. The first cue starts

@@ -13,7 +13,8 @@ float towards(float from, float to, float low, float high, float step) noexcept 
 }  // namespace
 
 bool limit(const LimitParams& p, const Setpoint& w, float dt_s, Setpoint& s) noexcept {
-  if (!std::isfinite(w.roll_rad) || !std::isfinite(w.pitch_rad) || !std::isfinite(w.yaw_rate_radps) || !std::isfinite(w.thrust))
+  if (!std::isfinite(w.roll_rad) || !std::isfinite(w.pitch_rad) || !std::isfinite(w.yaw_rate_radps) ||
+      !std::isfinite(w.thrust))
     return false;
   const float tilt_step = p.max_tilt_rate_radps * dt_s;
   s.roll_rad = towards(s.roll_rad, w.roll_rad, -p.max_tilt_rad, p.max_tilt_rad, tilt_step);

@@ -11,7 +11,7 @@ struct Setpoint {
 };
 
 struct LimitParams {
-  float max_tilt_rad = 0.26f;            ///< 15 degrees
+  float max_tilt_rad = 0.26f;  ///< 15 degrees
   float max_tilt_rate_radps = 1.5f;
   float max_yaw_rate_radps = 0.8f;
   float max_yaw_accel_radps2 = 4.f;

@@ -46,15 +46,20 @@ MissionWish wait_and_arm(const MissionParams& p, const MissionInput& in, Mission
 MissionWish fly_leg(const MissionParams& p, const MissionInput& in, MissionState& s, double in_phase_s) noexcept {
   const int leg = leg_of(s.phase);
   const bool last = p.follow_recording || leg + 1 >= p.leg_count;
-  const double length_s = static_cast<double>(p.follow_recording ? p.recording_seconds : p.legs[static_cast<std::size_t>(leg)].seconds);
+  const double length_s =
+      static_cast<double>(p.follow_recording ? p.recording_seconds : p.legs[static_cast<std::size_t>(leg)].seconds);
   MissionWish wish;
   wish.rotors = true;
   wish.armed = true;
   wish.target_m = p.follow_recording ? s.ground_height_m : p.legs[static_cast<std::size_t>(leg)].height_m;
-  if (!in.armed) enter(s, MissionPhase::kBroken, in.now_ns);  // disarmed in flight: never armed again from here
-  else if (in.stop_requested) enter(s, p.follow_recording ? MissionPhase::kDisarm : MissionPhase::kLand, in.now_ns);
-  else if (in_phase_s >= length_s && !last) enter(s, leg_phase(leg + 1), in.now_ns);
-  else if (in_phase_s >= length_s) enter(s, p.follow_recording ? MissionPhase::kDisarm : MissionPhase::kLand, in.now_ns);
+  if (!in.armed)
+    enter(s, MissionPhase::kBroken, in.now_ns);  // disarmed in flight: never armed again from here
+  else if (in.stop_requested)
+    enter(s, p.follow_recording ? MissionPhase::kDisarm : MissionPhase::kLand, in.now_ns);
+  else if (in_phase_s >= length_s && !last)
+    enter(s, leg_phase(leg + 1), in.now_ns);
+  else if (in_phase_s >= length_s)
+    enter(s, p.follow_recording ? MissionPhase::kDisarm : MissionPhase::kLand, in.now_ns);
   return wish;
 }
 
@@ -66,31 +71,43 @@ MissionWish mission_step(const MissionParams& p, const MissionInput& in, Mission
   MissionWish wish;
   switch (s.phase) {
     case MissionPhase::kWait:
-    case MissionPhase::kArm: return wait_and_arm(p, in, s, in_phase_s);
+    case MissionPhase::kArm:
+      return wait_and_arm(p, in, s, in_phase_s);
     case MissionPhase::kLand:
       wish = {s.ground_height_m - kBelowGround_m, true, false, true};
-      if (!in.armed) enter(s, MissionPhase::kDone, in.now_ns);
-      else if (standing_long_enough(in, s)) enter(s, MissionPhase::kDisarm, in.now_ns);
+      if (!in.armed)
+        enter(s, MissionPhase::kDone, in.now_ns);
+      else if (standing_long_enough(in, s))
+        enter(s, MissionPhase::kDisarm, in.now_ns);
       return wish;
     case MissionPhase::kDisarm:
       wish.disarm = true;
       if (!in.armed) enter(s, MissionPhase::kDone, in.now_ns);
       return wish;
     case MissionPhase::kDone:
-    case MissionPhase::kBroken: return wish;
-    default: return fly_leg(p, in, s, in_phase_s);
+    case MissionPhase::kBroken:
+      return wish;
+    default:
+      return fly_leg(p, in, s, in_phase_s);
   }
 }
 
 const char* name_of(MissionPhase phase) noexcept {
   switch (phase) {
-    case MissionPhase::kWait: return "waiting for the ground and the autopilot";
-    case MissionPhase::kArm: return "arming";
-    case MissionPhase::kLand: return "landing";
-    case MissionPhase::kDisarm: return "disarming";
-    case MissionPhase::kDone: return "done";
-    case MissionPhase::kBroken: return "broken off";
-    default: return "hover";
+    case MissionPhase::kWait:
+      return "waiting for the ground and the autopilot";
+    case MissionPhase::kArm:
+      return "arming";
+    case MissionPhase::kLand:
+      return "landing";
+    case MissionPhase::kDisarm:
+      return "disarming";
+    case MissionPhase::kDone:
+      return "done";
+    case MissionPhase::kBroken:
+      return "broken off";
+    default:
+      return "hover";
   }
 }
 

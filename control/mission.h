@@ -22,7 +22,15 @@ struct MissionParams {
   float patience_s = 20.f;        ///< give up if the autopilot does not arm or the ground is not seen by then
 };
 
-enum class MissionPhase : std::uint8_t { kWait = 0, kArm = 1, kLeg0 = 2, kLand = 20, kDisarm = 21, kDone = 22, kBroken = 23 };
+enum class MissionPhase : std::uint8_t {
+  kWait = 0,
+  kArm = 1,
+  kLeg0 = 2,
+  kLand = 20,
+  kDisarm = 21,
+  kDone = 22,
+  kBroken = 23
+};
 
 struct MissionInput {
   TimeNs now_ns = 0;
@@ -33,17 +41,17 @@ struct MissionInput {
 
 struct MissionState {
   MissionPhase phase = MissionPhase::kWait;
-  TimeNs since_ns = kNever;         ///< entry into the phase
-  TimeNs settled_since_ns = kNever; ///< on the ground since
-  float ground_height_m = 0;        ///< camera height while standing
+  TimeNs since_ns = kNever;          ///< entry into the phase
+  TimeNs settled_since_ns = kNever;  ///< on the ground since
+  float ground_height_m = 0;         ///< camera height while standing
 };
 
 /// What the mission wants at this tick.
 struct MissionWish {
   float target_m = 0;
-  bool armed = false;    ///< ask the autopilot to be armed and to follow
-  bool disarm = false;   ///< ask it to disarm
-  bool rotors = false;   ///< false: zero thrust (standing on the ground)
+  bool armed = false;   ///< ask the autopilot to be armed and to follow
+  bool disarm = false;  ///< ask it to disarm
+  bool rotors = false;  ///< false: zero thrust (standing on the ground)
 };
 
 /// Realtime-safe: yes.

@@ -1,4 +1,5 @@
-// PID (B.16) with output limits and conditional-integration anti-windup. Derivative on measurement, given by the caller.
+// PID (B.16) with output limits and conditional-integration anti-windup. Derivative on measurement, given by the
+// caller.
 #pragma once
 
 namespace wasp::control {
@@ -19,7 +20,8 @@ struct PidState {
 inline float pid_step(const PidParams& params, float error, float error_rate, float dt_s, PidState& state) noexcept {
   const float increment = params.ki * error * dt_s;
   const float wanted = params.kp * error + state.integral + increment + params.kd * error_rate;
-  const bool winding_up = (wanted > params.output_max && increment > 0) || (wanted < params.output_min && increment < 0);
+  const bool winding_up =
+      (wanted > params.output_max && increment > 0) || (wanted < params.output_min && increment < 0);
   if (!winding_up) state.integral += increment;
   const float output = params.kp * error + state.integral + params.kd * error_rate;
   return output < params.output_min ? params.output_min : output > params.output_max ? params.output_max : output;

@@ -16,8 +16,8 @@ namespace wasp::rt {
 /// Depth of real-time sections on this thread; allocator guards in tests read it.
 inline thread_local int realtime_depth = 0;
 
-/// The fences keep each change of depth in its place: the compiler knows that malloc reads no variable of ours, and would
-/// otherwise move or drop the stores around it. Realtime-safe: yes (no instruction).
+/// The fences keep each change of depth in its place: the compiler knows that malloc reads no variable of ours, and
+/// would otherwise move or drop the stores around it. Realtime-safe: yes (no instruction).
 inline void set_realtime_depth(int depth) noexcept {
   std::atomic_signal_fence(std::memory_order_seq_cst);
   realtime_depth = depth;

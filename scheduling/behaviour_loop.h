@@ -16,7 +16,7 @@ namespace wasp::scheduling {
 struct BehaviourWiring {
   const shm::Region* camera = nullptr;
   const shm::Region* flight = nullptr;
-  std::uint32_t index = 0;        ///< Cue::behaviour
+  std::uint32_t index = 0;  ///< Cue::behaviour
   DurationNs budget_ns = 0;
   StageTable* stages = nullptr;
   const BehaviourScript* script = nullptr;  ///< replay of a wasp recording: inputs as recorded, frames in order

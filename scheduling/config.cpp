@@ -53,7 +53,8 @@ void read_camera(TomlTable t, Config& c) {
   std::vector<double> position;
   t.numbers("position_body_m", position, -10, 10);
   if (!position.empty() && position.size() != 3) throw ConfigError("camera.position_body_m needs three numbers");
-  for (std::size_t i = 0; i < position.size(); ++i) c.camera.position_body_m[static_cast<Eigen::Index>(i)] = static_cast<float>(position[i]);
+  for (std::size_t i = 0; i < position.size(); ++i)
+    c.camera.position_body_m[static_cast<Eigen::Index>(i)] = static_cast<float>(position[i]);
   t.finish();
 }
 
@@ -67,7 +68,8 @@ void read_mission(TomlTable t, control::MissionParams& m) {
   if (heights.size() != seconds.size() || heights.size() > control::MissionParams::kMaxLegs)
     throw ConfigError("mission.heights_m and mission.seconds must have the same length, 1 to 8");
   m.leg_count = static_cast<int>(heights.size());
-  for (std::size_t i = 0; i < heights.size(); ++i) m.legs[i] = {static_cast<float>(heights[i]), static_cast<float>(seconds[i])};
+  for (std::size_t i = 0; i < heights.size(); ++i)
+    m.legs[i] = {static_cast<float>(heights[i]), static_cast<float>(seconds[i])};
 }
 
 void read_control(TomlTable t, Config& c) {
@@ -80,7 +82,8 @@ void read_control(TomlTable t, Config& c) {
   read_milliseconds(t, "ground_hold_limit_ms", c.control.ground_hold_limit_ns);
   std::string action = c.control.failsafe_action == control::FailsafeAction::kDescend ? "descend" : "stop_stream";
   t.text_value("failsafe_action", action, {"descend", "stop_stream"});
-  c.control.failsafe_action = action == "descend" ? control::FailsafeAction::kDescend : control::FailsafeAction::kStopStream;
+  c.control.failsafe_action =
+      action == "descend" ? control::FailsafeAction::kDescend : control::FailsafeAction::kStopStream;
   t.number("failsafe_thrust_share", c.control.failsafe_thrust_share, 0.5, 1.0);
   auto& hold = c.control.altitude_hold;
   t.number("mass_kg", hold.mass_kg, 0.05, 50);
@@ -93,7 +96,8 @@ void read_control(TomlTable t, Config& c) {
   t.number("max_tilt_deg", tilt_deg, 1, 45);
   c.control.limits.max_tilt_rad = static_cast<float>(to_radians(Degrees{tilt_deg}).value);
   t.finish();
-  if (hold.mass_kg * 9.81f > 0.95f * hold.full_thrust_n) throw ConfigError("control: the vehicle is too heavy for its thrust");
+  if (hold.mass_kg * 9.81f > 0.95f * hold.full_thrust_n)
+    throw ConfigError("control: the vehicle is too heavy for its thrust");
 }
 
 void read_behaviours(TomlTable t, Config& c) {

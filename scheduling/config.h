@@ -40,7 +40,7 @@ struct Config {
   ThreadRow control_thread{"control", 1, 80, 2 * kMillisecond};
   ThreadRow link_thread{"link", 1, 70, 1 * kMillisecond};
   ThreadRow camera_thread{"camera", 1, 60, 5 * kMillisecond};
-  std::vector<ThreadRow> behaviours;  ///< index = Cue::behaviour
+  std::vector<ThreadRow> behaviours;        ///< index = Cue::behaviour
   std::vector<TomlTable> behaviour_params;  ///< [behaviour.NAME.params], checked by the behaviour's own list
 };
 

@@ -73,7 +73,8 @@ void ControlLoop::gather(control::ControlInput& input) WASP_REALTIME {
   mean_acceleration(input);
   LinkReport report;
   if (wiring_.link->load(report))
-    input.autopilot = {report.heard_at_ns, report.armed != 0, static_cast<int>(report.custom_mode) == config_.follow_mode};
+    input.autopilot = {report.heard_at_ns, report.armed != 0,
+                       static_cast<int>(report.custom_mode) == config_.follow_mode};
 }
 
 /// Mean specific force of the samples that came since the last tick; bounded by the ring's length.
@@ -92,7 +93,8 @@ void ControlLoop::mean_acceleration(control::ControlInput& input) WASP_REALTIME 
 void ControlLoop::send(const control::ControlOutput& output, Command& command, TimeNs now_ns) WASP_REALTIME {
   std::size_t used = 0;
   if (command.sent != 0)
-    used = wiring_.autopilot->encode_attitude_target({command.q_ned_body, true, command.yaw_rate_radps, command.thrust}, now_ns, out_);
+    used = wiring_.autopilot->encode_attitude_target({command.q_ned_body, true, command.yaw_rate_radps, command.thrust},
+                                                     now_ns, out_);
   const std::size_t setpoint_bytes = used;
   used = append_requests(output, used, now_ns);
   if (used == 0) return;
@@ -101,7 +103,8 @@ void ControlLoop::send(const control::ControlOutput& output, Command& command, T
 }
 
 /// Heartbeat, TIMESYNC request, arming: behind the setpoint in the same write. Returns the bytes used.
-std::size_t ControlLoop::append_requests(const control::ControlOutput& output, std::size_t used, TimeNs now_ns) WASP_REALTIME {
+std::size_t ControlLoop::append_requests(const control::ControlOutput& output, std::size_t used,
+                                         TimeNs now_ns) WASP_REALTIME {
   const auto rest = [&] { return std::span<std::uint8_t>(out_).subspan(used); };
   drivers::AutopilotLink& link = *wiring_.autopilot;
   if (now_ns >= heartbeat_due_ns_) {
@@ -124,24 +127,28 @@ void ControlLoop::account(const control::ControlInput& input, Command& command, 
     write_->record(command.written_at_ns - command.computed_at_ns);
     tick_to_byte_->record(command.written_at_ns - command.due_at_ns);
   }
-  const bool missed = command.sent != 0 && (!written || command.written_at_ns - command.due_at_ns > config_.control_deadline_ns);
+  const bool missed =
+      command.sent != 0 && (!written || command.written_at_ns - command.due_at_ns > config_.control_deadline_ns);
   consecutive_misses_ = missed ? consecutive_misses_ + 1 : 0;
   if (missed) control.status->deadline_misses.fetch_add(1, std::memory_order_relaxed);
   for (std::size_t i = 0; i < cues_.size(); ++i) {
     const Cue& cue = input.cues.cues[i];
     if (!input.cues.present[i]) continue;
     behaviour_stages_[i].age->record(input.now_ns - cue.exposed_at_ns);
-    if (written && cue.exposed_at_ns != last_exposed_[i]) behaviour_stages_[i].end_to_end->record(command.written_at_ns - cue.exposed_at_ns);
+    if (written && cue.exposed_at_ns != last_exposed_[i])
+      behaviour_stages_[i].end_to_end->record(command.written_at_ns - cue.exposed_at_ns);
     last_exposed_[i] = cue.exposed_at_ns;
   }
 }
 
 void ControlLoop::announce(const Command& command) WASP_REALTIME {
-  if (command.mode != announced_mode_) wiring_.events->say(command.released_at_ns, "flight mode: ", control::name_of(command.mode));
+  if (command.mode != announced_mode_)
+    wiring_.events->say(command.released_at_ns, "flight mode: ", control::name_of(command.mode));
   if (command.mode != announced_mode_ && command.mode == FlightMode::kFailsafe)
     wiring_.events->say(command.released_at_ns, "failsafe because: ", control::name_of(command.reason));
   if (command.mission_phase != announced_phase_)
-    wiring_.events->say(command.released_at_ns, "mission: ", control::name_of(static_cast<control::MissionPhase>(command.mission_phase)));
+    wiring_.events->say(command.released_at_ns,
+                        "mission: ", control::name_of(static_cast<control::MissionPhase>(command.mission_phase)));
   announced_mode_ = command.mode;
   announced_phase_ = command.mission_phase;
 }

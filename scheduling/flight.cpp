@@ -95,7 +95,8 @@ class Flight {
     const double seconds = options_.seconds > 0 ? options_.seconds : to_seconds(ReplayCamera::lap_ns(recording));
     config_.control.mission.follow_recording = true;
     config_.control.mission.recording_seconds = static_cast<float>(seconds);
-    camera_ = std::make_unique<shm::Region>(shm::Region::create(shm::camera_region(options_.instance), ReplayCamera::topics(recording)));
+    camera_ = std::make_unique<shm::Region>(
+        shm::Region::create(shm::camera_region(options_.instance), ReplayCamera::topics(recording)));
     replay_ = std::make_unique<ReplayCamera>(std::move(recording), *camera_, from_seconds(seconds), stages_);
   }
 
@@ -119,18 +120,23 @@ class Flight {
       bodies_.push_back(row.make(config_.camera, config_.behaviour_params[i], w));
     }
     link_ = std::make_unique<LinkLoop>(flight_, port_, autopilot_, stages_, report_, link_events_);
-    control_loop_ = std::make_unique<ControlLoop>(config_, ControlWiring{&flight_, &stages_, &report_, &port_, &autopilot_, &control_events_});
+    control_loop_ = std::make_unique<ControlLoop>(
+        config_, ControlWiring{&flight_, &stages_, &report_, &port_, &autopilot_, &control_events_});
   }
 
   /// Locks memory and keeps the processor awake; refuses by name where a right is missing.
   void prepare_real_time() {
+    if (!real_time_ && config_.enforce_real_time)
+      throw std::runtime_error("refusing to arm: --no-rt was given, but the configuration says [run] enforce_real_time = true");
     if (!real_time_) return;
     std::string refusal;
-    for (const auto& m : rt::missing_rights(config_.control_thread.priority)) refusal += "\n  missing right: " + m.right + "; grant it with: " + m.remedy;
+    for (const auto& m : rt::missing_rights(config_.control_thread.priority))
+      refusal += "\n  missing right: " + m.right + "; grant it with: " + m.remedy;
     if (!refusal.empty()) throw std::runtime_error("refusing to arm without real time (or say --no-rt):" + refusal);
     latency_hold_ = std::make_unique<rt::CpuLatencyHold>();
     if (!latency_hold_->held()) log("note: /dev/cpu_dma_latency is not available; the processor may sleep deeply");
-    if (const std::string why = rt::lock_memory(static_cast<std::size_t>(config_.heap_mib) << 20); !why.empty()) throw std::runtime_error("refusing to arm: " + why);
+    if (const std::string why = rt::lock_memory(static_cast<std::size_t>(config_.heap_mib) << 20); !why.empty())
+      throw std::runtime_error("refusing to arm: " + why);
   }
 
   rt::ThreadSpec spec(const ThreadRow& row) const {
@@ -143,7 +149,8 @@ class Flight {
   }
 
   void start_threads() {
-    for (std::size_t i = 0; i < bodies_.size(); ++i) threads_.emplace_back(spec(config_.behaviours[i]), [this, i] { bodies_[i](control_); });
+    for (std::size_t i = 0; i < bodies_.size(); ++i)
+      threads_.emplace_back(spec(config_.behaviours[i]), [this, i] { bodies_[i](control_); });
     threads_.emplace_back(spec(config_.link_thread), [this] { link_->run(control_); });
     if (replay_) {
       threads_.emplace_back(spec(config_.camera_thread), [this] { replay_->run(control_); });
@@ -176,9 +183,12 @@ class Flight {
 
   int conclude() {
     RunStatus& status = *control_.status;
-    if (replay_ && replay_->held_back() > 0) log("replay: the camera was held back " + std::to_string(replay_->held_back()) + " times for a slow reader");
-    if (replay_ && replay_->decode_errors() > 0) log("replay: " + std::to_string(replay_->decode_errors()) + " frames could not be decoded");
-    log("page faults in real-time threads: " + std::to_string(status.minor_faults) + " minor, " + std::to_string(status.major_faults) + " major");
+    if (replay_ && replay_->held_back() > 0)
+      log("replay: the camera was held back " + std::to_string(replay_->held_back()) + " times for a slow reader");
+    if (replay_ && replay_->decode_errors() > 0)
+      log("replay: " + std::to_string(replay_->decode_errors()) + " frames could not be decoded");
+    log("page faults in real-time threads: " + std::to_string(status.minor_faults) + " minor, " +
+        std::to_string(status.major_faults) + " major");
     const bool flown = status.mission_result.load() == 1;
     log(flown ? "mission flown to its end" : "mission broken off");
     status.finished = 1;
@@ -212,7 +222,8 @@ std::optional<int> parse(int argc, char** argv, Options& o) {
   app.name("wasp flight");
   app.option_defaults()->always_capture_default();
   app.add_option("--instance", o.instance, "name of its shared memory: wasp.NAME.flight");
-  app.add_option("--config", o.configs, "TOML files in order, later ones override single keys")->check(CLI::ExistingFile);
+  app.add_option("--config", o.configs, "TOML files in order, later ones override single keys")
+      ->check(CLI::ExistingFile);
   app.add_option("--replay", o.replay, "take frames from this recording");
   app.add_option("--seconds", o.seconds, "length of a replay (0: once through)");
   app.add_flag("--no-rt", o.no_rt, "ordinary scheduling, no locked memory; every figure is marked 'not real time'");

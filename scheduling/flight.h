@@ -15,24 +15,28 @@ struct BehaviourRow {
   std::string name;
   Stream stream;
   /// Builds the adaptor (before arming) with its parameters from the configuration; the result is its thread's body.
-  std::function<std::function<void(LoopControl&)>(const CameraGeometry&, TomlTable params, const BehaviourWiring&)> make;
+  std::function<std::function<void(LoopControl&)>(const CameraGeometry&, TomlTable params, const BehaviourWiring&)>
+      make;
 };
 using BehaviourTable = std::vector<BehaviourRow>;
 
 template <Behaviour B>
 BehaviourRow behaviour_row() {
-  return {std::string(B::kName), B::kStream, [](const CameraGeometry& camera, TomlTable table, const BehaviourWiring& wiring) {
+  return {std::string(B::kName), B::kStream,
+          [](const CameraGeometry& camera, TomlTable table, const BehaviourWiring& wiring) {
             typename B::Params params;
             params.camera = camera;
-            B::visit_params(params, [&](const char* key, auto& field, double low, double high) { table.number(key, field, low, high); });
+            B::visit_params(params, [&](const char* key, auto& field, double low, double high) {
+              table.number(key, field, low, high);
+            });
             table.finish();
             auto loop = std::make_shared<BehaviourLoop<B>>(params, wiring);
             return [loop](LoopControl& control) { loop->run(control); };
           }};
 }
 
-/// `wasp flight`: parses its command line and flies. Exit code 0: flown to its end or stopped in order; 1: broken off or
-/// an error, said on standard error; 2: bad arguments.
+/// `wasp flight`: parses its command line and flies. Exit code 0: flown to its end or stopped in order; 1: broken off
+/// or an error, said on standard error; 2: bad arguments.
 int flight_main(const BehaviourTable& behaviours, int argc, char** argv);
 
 }  // namespace wasp::scheduling

@@ -18,7 +18,8 @@ std::byte* block(const shm::Region& region, const char* topic, const char* type)
 
 }  // namespace
 
-shm::Region create_flight_region(const std::string& instance, const std::vector<std::string>& behaviours, bool real_time) {
+shm::Region create_flight_region(const std::string& instance, const std::vector<std::string>& behaviours,
+                                 bool real_time) {
   std::vector<shm::TopicSpec> specs{
       {shm::kImu, "Imu", TopicKind::kRing, shm::kImuSlots, sizeof(ImuSample)},
       {shm::kAttitude, "Attitude", TopicKind::kRing, shm::kAttitudeSlots, sizeof(AttitudeSample)},
@@ -26,8 +27,10 @@ shm::Region create_flight_region(const std::string& instance, const std::vector<
       {shm::kStages, "StageTable", TopicKind::kBlock, 1, sizeof(StageTable)},
       {"run", "RunStatus", TopicKind::kBlock, 1, sizeof(RunStatus)},
   };
-  for (const auto& name : behaviours) specs.push_back({shm::cue_topic(name), "Cue", TopicKind::kRing, shm::kCueSlots, sizeof(Cue)});
-  shm::Region region = shm::Region::create(shm::flight_region(instance), specs, real_time ? "real time" : "NOT REAL TIME");
+  for (const auto& name : behaviours)
+    specs.push_back({shm::cue_topic(name), "Cue", TopicKind::kRing, shm::kCueSlots, sizeof(Cue)});
+  shm::Region region =
+      shm::Region::create(shm::flight_region(instance), specs, real_time ? "real time" : "NOT REAL TIME");
   new (block(region, shm::kStages, "StageTable")) StageTable;
   auto* status = new (block(region, "run", "RunStatus")) RunStatus;
   status->real_time = real_time ? 1 : 0;

@@ -12,7 +12,8 @@ namespace wasp::scheduling {
 
 /// Creates wasp.<instance>.flight with imu, attitude, command, one cue topic per behaviour, stages and run. A region
 /// left by a crashed flight is taken over with its history; its counters start anew.
-shm::Region create_flight_region(const std::string& instance, const std::vector<std::string>& behaviours, bool real_time);
+shm::Region create_flight_region(const std::string& instance, const std::vector<std::string>& behaviours,
+                                 bool real_time);
 
 StageTable& stage_table(const shm::Region& flight);
 RunStatus& run_status(const shm::Region& flight);

@@ -11,7 +11,7 @@
 namespace wasp::scheduling {
 
 struct DecodedFrame {
-  DurationNs offset_ns = 0;       ///< due this long after the start of the replay
+  DurationNs offset_ns = 0;  ///< due this long after the start of the replay
   std::uint32_t sequence = 0;
   bool has_depth = false, has_gray = false;
   std::vector<std::uint16_t> depth_mm;
@@ -31,10 +31,10 @@ class FramePool {
     }
   }
   DecodedFrame& frame(std::uint32_t index) { return frames_[index]; }
-  bool take_empty(std::uint32_t& index) { return empty_.pop(index); }        ///< decoder
-  void give_full(std::uint32_t index) { full_.push(index); }                 ///< decoder
-  bool take_full(std::uint32_t& index) WASP_REALTIME { return full_.pop(index); }   ///< camera
-  void give_empty(std::uint32_t index) WASP_REALTIME { empty_.push(index); }        ///< camera
+  bool take_empty(std::uint32_t& index) { return empty_.pop(index); }              ///< decoder
+  void give_full(std::uint32_t index) { full_.push(index); }                       ///< decoder
+  bool take_full(std::uint32_t& index) WASP_REALTIME { return full_.pop(index); }  ///< camera
+  void give_empty(std::uint32_t index) WASP_REALTIME { empty_.push(index); }       ///< camera
 
  private:
   std::vector<DecodedFrame> frames_;

@@ -44,7 +44,8 @@ class FrameSource {
     const auto& h = frame.header;
     const int width = static_cast<int>(h.width_px), height = static_cast<int>(h.height_px);
     if (stream_ == Stream::kDepth)
-      frame.depth = {reinterpret_cast<const std::uint16_t*>(pixels), width, height, static_cast<int>(h.stride_bytes / 2)};
+      frame.depth = {reinterpret_cast<const std::uint16_t*>(pixels), width, height,
+                     static_cast<int>(h.stride_bytes / 2)};
     else
       frame.gray = {reinterpret_cast<const std::uint8_t*>(pixels), width, height, static_cast<int>(h.stride_bytes)};
     return frame;

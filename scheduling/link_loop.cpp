@@ -5,15 +5,15 @@
 
 namespace wasp::scheduling {
 namespace {
-constexpr DurationNs kPatience = 20 * kMillisecond;        // longest sleep: the stop flag is seen by then
+constexpr DurationNs kPatience = 20 * kMillisecond;  // longest sleep: the stop flag is seen by then
 constexpr DurationNs kTimesyncPeriod = 200 * kMillisecond;
 constexpr DurationNs kReopenPeriod = 50 * kMillisecond;
-constexpr int kRoomForReply_bytes = 1024;                  // pending output below which an answer may go out
+constexpr int kRoomForReply_bytes = 1024;  // pending output below which an answer may go out
 constexpr int kReadsPerWake = 8;
 }  // namespace
 
-LinkLoop::LinkLoop(const shm::Region& flight, drivers::SerialPort& port, drivers::AutopilotLink& autopilot, StageTable& stages,
-                   rt::Seqlock<LinkReport>& report, EventQueue& events)
+LinkLoop::LinkLoop(const shm::Region& flight, drivers::SerialPort& port, drivers::AutopilotLink& autopilot,
+                   StageTable& stages, rt::Seqlock<LinkReport>& report, EventQueue& events)
     : port_(port),
       autopilot_(autopilot),
       imu_(flight, shm::kImu, "Imu"),
@@ -82,7 +82,9 @@ void LinkLoop::on_ack(std::uint16_t command, std::uint8_t result) WASP_REALTIME 
   if (result > 1) events_.say(received_at_ns_, "autopilot refused command ", static_cast<long>(command));
 }
 
-void LinkLoop::on_statustext(std::uint8_t, std::string_view text) WASP_REALTIME { events_.say(received_at_ns_, "autopilot: ", text); }
+void LinkLoop::on_statustext(std::uint8_t, std::string_view text) WASP_REALTIME {
+  events_.say(received_at_ns_, "autopilot: ", text);
+}
 
 void LinkLoop::reply(std::span<const std::uint8_t> bytes) WASP_REALTIME {
   if (port_.pending_output_bytes() < kRoomForReply_bytes) port_.write(bytes);

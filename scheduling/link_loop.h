@@ -1,7 +1,6 @@
-// The link thread: bytes from the serial line become IMU and attitude samples in the rings and a report on the autopilot.
-// It asks for the autopilot's time and answers
-// when asked (only while the line has room, so that an answer never splits a setpoint) and reopens a
-// lost line by itself.
+// The link thread: bytes from the serial line become IMU and attitude samples in the rings and a report on the
+// autopilot. It asks for the autopilot's time and answers when asked (only while the line has room, so that an answer
+// never splits a setpoint) and reopens a lost line by itself.
 #pragma once
 
 #include "drivers/autopilot_link.h"

@@ -12,9 +12,9 @@ namespace wasp::scheduling {
 
 /// State shared by all loops of one flight process.
 struct LoopControl {
-  std::atomic<bool> stop{false};            ///< end all loops
-  std::atomic<bool> stop_requested{false};  ///< land in order, then end
-  std::atomic<bool> realtime_started{false};///< set once every thread stands: faults count from here
+  std::atomic<bool> stop{false};              ///< end all loops
+  std::atomic<bool> stop_requested{false};    ///< land in order, then end
+  std::atomic<bool> realtime_started{false};  ///< set once every thread stands: faults count from here
   bool strict_syscalls = false;
   RunStatus* status = nullptr;
 };

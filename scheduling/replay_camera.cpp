@@ -31,13 +31,16 @@ void write_frame(shm::RingWriter& ring, const void* pixels, drivers::Recording::
 
 std::vector<shm::TopicSpec> ReplayCamera::topics(const drivers::Recording& r) {
   std::vector<shm::TopicSpec> specs;
-  const auto bytes = [](drivers::Recording::Size size, std::size_t pixel_bytes) { return kFramePixelOffset + std::max<std::size_t>(64, size.pixels() * pixel_bytes); };
+  const auto bytes = [](drivers::Recording::Size size, std::size_t pixel_bytes) {
+    return kFramePixelOffset + std::max<std::size_t>(64, size.pixels() * pixel_bytes);
+  };
   specs.push_back({shm::kDepth, "Frame", shm::TopicKind::kRing, shm::kFrameSlots, bytes(r.depth_size(), 2)});
   specs.push_back({shm::kGray, "Frame", shm::TopicKind::kRing, shm::kFrameSlots, bytes(r.gray_size(), 1)});
   return specs;
 }
 
-ReplayCamera::ReplayCamera(drivers::Recording recording, const shm::Region& camera, DurationNs length_ns, StageTable& stages)
+ReplayCamera::ReplayCamera(drivers::Recording recording, const shm::Region& camera, DurationNs length_ns,
+                           StageTable& stages)
     : recording_(std::move(recording)),
       length_ns_(length_ns),
       depth_(std::make_unique<shm::RingWriter>(camera, shm::kDepth, "Frame")),
@@ -83,8 +86,11 @@ void ReplayCamera::decode(LoopControl& control) {
         all_decoded_ = true;
         return;
       }
-      while (!holding && !(holding = pool_.take_empty(slot)) && !control.stop) rt::sleep_until(rt::now() + 2 * kMillisecond);
-      if (!holding || !decode_one(i, offset_ns, lap * lap_sequence(recording_) + entries[i].sequence, pool_.frame(slot))) continue;
+      while (!holding && !(holding = pool_.take_empty(slot)) && !control.stop)
+        rt::sleep_until(rt::now() + 2 * kMillisecond);
+      if (!holding ||
+          !decode_one(i, offset_ns, lap * lap_sequence(recording_) + entries[i].sequence, pool_.frame(slot)))
+        continue;
       pool_.give_full(slot);
       holding = false;
       any = true;
@@ -103,9 +109,11 @@ bool ReplayCamera::readers_keep_up() const noexcept {
 
 void ReplayCamera::publish(const DecodedFrame& frame, TimeNs exposed_at_ns) WASP_REALTIME {
   if (frame.has_depth)
-    write_frame(*depth_, frame.depth_mm.data(), recording_.depth_size(), 2, PixelFormat::kDepth16Mm, frame.sequence, exposed_at_ns);
+    write_frame(*depth_, frame.depth_mm.data(), recording_.depth_size(), 2, PixelFormat::kDepth16Mm, frame.sequence,
+                exposed_at_ns);
   if (frame.has_gray)
-    write_frame(*gray_, frame.gray.data(), recording_.gray_size(), 1, PixelFormat::kMono8, frame.sequence, exposed_at_ns);
+    write_frame(*gray_, frame.gray.data(), recording_.gray_size(), 1, PixelFormat::kMono8, frame.sequence,
+                exposed_at_ns);
 }
 
 void ReplayCamera::run(LoopControl& control) {

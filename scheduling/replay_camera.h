@@ -1,6 +1,6 @@
 // The replay camera: an ordinary thread decodes ahead, a real-time thread loans ring slots and publishes each frame at
-// its recorded time, so that behaviours see a camera. Should a behaviour fall several frames behind (a stalled host), the
-// camera holds the next frame back and counts it: a replay loses nothing.
+// its recorded time, so that behaviours see a camera. Should a behaviour fall several frames behind (a stalled host),
+// the camera holds the next frame back and counts it: a replay loses nothing.
 #pragma once
 
 #include <algorithm>
@@ -29,7 +29,9 @@ class ReplayCamera {
   static DurationNs lap_ns(const drivers::Recording& recording);
 
   /// Frame sequence at which the second pass starts.
-  static std::uint32_t lap_sequence(const drivers::Recording& recording) { return recording.entries().back().sequence + 1; }
+  static std::uint32_t lap_sequence(const drivers::Recording& recording) {
+    return recording.entries().back().sequence + 1;
+  }
 
   /// A behaviour that must not lose frames: number of its stream's newest frame it has finished with.
   std::atomic<std::uint64_t>* add_reader(bool depth);

@@ -57,8 +57,10 @@ std::map<std::string, BehaviourScript> load_replay_script(const std::string& fol
   std::string line;
   if (!file || !std::getline(file, line)) return scripts;
   const Columns columns(path, line);
-  const std::size_t name = columns.at("behaviour"), frame = columns.at("frame_sequence"), valid = columns.at("attitude_valid");
-  const std::size_t exposed = columns.at("exposed_at_ns"), q = columns.at("q_w"), rate = columns.at("rate_x_body_radps");
+  const std::size_t name = columns.at("behaviour"), frame = columns.at("frame_sequence"),
+                    valid = columns.at("attitude_valid");
+  const std::size_t exposed = columns.at("exposed_at_ns"), q = columns.at("q_w"),
+                    rate = columns.at("rate_x_body_radps");
   for (int number = 2; std::getline(file, line); ++number) {
     const std::string where = path + ":" + std::to_string(number);
     const auto cells = split(line);
@@ -72,7 +74,8 @@ std::map<std::string, BehaviourScript> load_replay_script(const std::string& fol
     scripts[std::string(cells[name])].push_back(step);
   }
   for (auto& [key, script] : scripts)
-    std::stable_sort(script.begin(), script.end(), [](const auto& a, const auto& b) { return a.frame_sequence < b.frame_sequence; });
+    std::stable_sort(script.begin(), script.end(),
+                     [](const auto& a, const auto& b) { return a.frame_sequence < b.frame_sequence; });
   return scripts;
 }
 

@@ -15,8 +15,8 @@ namespace wasp::scheduling {
 struct Stage {
   std::array<char, 32> owner{};
   std::array<char, 32> stage{};
-  std::int64_t budget_ns = 0;             ///< 0: no bound stated
-  std::atomic<std::uint64_t> misses{0};   ///< samples above the budget
+  std::int64_t budget_ns = 0;            ///< 0: no bound stated
+  std::atomic<std::uint64_t> misses{0};  ///< samples above the budget
   rt::Histogram histogram;
 
   /// One writer. Realtime-safe: yes, wait-free.
@@ -60,17 +60,17 @@ struct StageTable {
 
 /// Block topic "run" (type RunStatus): the state of the flight in single words. One writer a word.
 struct RunStatus {
-  std::atomic<std::uint32_t> real_time{0};      ///< 1: policies and memory lock in force; 0: "not real time"
-  std::atomic<std::uint32_t> preempt_rt{0};     ///< 1: PREEMPT_RT kernel
+  std::atomic<std::uint32_t> real_time{0};   ///< 1: policies and memory lock in force; 0: "not real time"
+  std::atomic<std::uint32_t> preempt_rt{0};  ///< 1: PREEMPT_RT kernel
   std::atomic<std::uint32_t> armed{0};
-  std::atomic<std::uint32_t> finished{0};       ///< 1: the flight process has ended in order
-  std::atomic<std::uint64_t> ticks{0};          ///< control releases served
-  std::atomic<std::uint64_t> skipped{0};        ///< control releases skipped
-  std::atomic<std::uint64_t> deadline_misses{0};///< ticks whose last byte was late or was not written
-  std::atomic<std::uint64_t> minor_faults{0};   ///< of real-time threads since arming
+  std::atomic<std::uint32_t> finished{0};         ///< 1: the flight process has ended in order
+  std::atomic<std::uint64_t> ticks{0};            ///< control releases served
+  std::atomic<std::uint64_t> skipped{0};          ///< control releases skipped
+  std::atomic<std::uint64_t> deadline_misses{0};  ///< ticks whose last byte was late or was not written
+  std::atomic<std::uint64_t> minor_faults{0};     ///< of real-time threads since arming
   std::atomic<std::uint64_t> major_faults{0};
-  std::atomic<std::uint64_t> frames_lost{0};    ///< overwritten while or before a behaviour used them
-  std::atomic<std::uint64_t> bad_frames{0};     ///< link frames with a bad checksum
+  std::atomic<std::uint64_t> frames_lost{0};  ///< overwritten while or before a behaviour used them
+  std::atomic<std::uint64_t> bad_frames{0};   ///< link frames with a bad checksum
   std::atomic<std::uint64_t> link_reconnects{0};
   std::atomic<std::uint32_t> behaviour_count{0};
   std::array<std::array<char, 32>, 16> behaviours{};  ///< names by Cue::behaviour index

@@ -54,9 +54,12 @@ void TomlTable::numbers(const char* key, std::vector<double>& out, double low, d
   std::vector<double> xs;
   for (const auto& item : v->as_array()) {
     double x = 0;
-    if (item.is_floating()) x = item.as_floating();
-    else if (item.is_integer()) x = static_cast<double>(item.as_integer());
-    else fail(item, "must be a number");
+    if (item.is_floating())
+      x = item.as_floating();
+    else if (item.is_integer())
+      x = static_cast<double>(item.as_integer());
+    else
+      fail(item, "must be a number");
     if (!(x >= low && x <= high)) fail(item, "must lie in " + text(low) + " ... " + text(high));
     xs.push_back(x);
   }

@@ -1,5 +1,5 @@
-// A TOML table read strictly: every value has a range, every error names file, line and value, and keys nobody asked for
-// are errors.
+// A TOML table read strictly: every value has a range, every error names file, line and value, and keys nobody asked
+// for are errors.
 #pragma once
 
 #include <set>
@@ -28,10 +28,14 @@ class TomlTable {
     const toml::value* v = find(key);
     if (v == nullptr) return;
     double x = 0;
-    if (v->is_floating()) x = v->as_floating();
-    else if (v->is_integer()) x = static_cast<double>(v->as_integer());
-    else fail(*v, "must be a number");
-    if (std::is_integral_v<T> && x != static_cast<double>(static_cast<long long>(x))) fail(*v, "must be a whole number");
+    if (v->is_floating())
+      x = v->as_floating();
+    else if (v->is_integer())
+      x = static_cast<double>(v->as_integer());
+    else
+      fail(*v, "must be a number");
+    if (std::is_integral_v<T> && x != static_cast<double>(static_cast<long long>(x)))
+      fail(*v, "must be a whole number");
     if (!(x >= low && x <= high)) fail(*v, "must lie in " + text(low) + " ... " + text(high));
     out = static_cast<T>(x);
   }

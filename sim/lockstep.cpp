@@ -11,8 +11,7 @@ constexpr std::size_t kKeptAttitudes = 100;
 
 }  // namespace
 
-Lockstep::Lockstep(const LockstepOptions& options)
-    : options_(options), simulator_(options.sim), camera_(options.sim) {
+Lockstep::Lockstep(const LockstepOptions& options) : options_(options), simulator_(options.sim), camera_(options.sim) {
   const auto pixels = static_cast<std::size_t>(camera_.width_px()) * static_cast<std::size_t>(camera_.height_px());
   gray_.resize(pixels);
   depth_mm_.resize(pixels);
@@ -79,7 +78,8 @@ void Lockstep::expose(TimeNs now_ns) {
   input.frame_sequence = frame_++;
   input.gray = {gray_.data(), camera_.width_px(), camera_.height_px(), camera_.width_px()};
   input.depth = {depth_mm_.data(), camera_.width_px(), camera_.height_px(), camera_.width_px()};
-  const auto after = std::find_if(attitudes_.rbegin(), attitudes_.rend(), [&](const auto& a) { return a.exposed_at_ns <= now_ns; });
+  const auto after =
+      std::find_if(attitudes_.rbegin(), attitudes_.rend(), [&](const auto& a) { return a.exposed_at_ns <= now_ns; });
   input.attitude_valid = after != attitudes_.rend();
   if (input.attitude_valid) input.attitude = *after;
   pending_.push_back(step<vision::GroundAltitude>(ground_params_, ground_state_, input, 0));

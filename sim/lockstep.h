@@ -16,7 +16,7 @@ namespace wasp::sim {
 
 struct LockstepOptions {
   SimConfig sim;
-  control::ControlParams control;             ///< arbiter row 0: ground_altitude, row 1: edge_altitude
+  control::ControlParams control;                    ///< arbiter row 0: ground_altitude, row 1: edge_altitude
   DurationNs camera_latency_ns = 25 * kMillisecond;  ///< exposure to cue
   DurationNs control_period_ns = 50 * kMillisecond;
 };
@@ -50,7 +50,8 @@ class Lockstep {
   void tick(TimeNs now_ns);
   void send(const control::ControlOutput& output, TimeNs now_ns);
   template <class B>
-  Cue step(const typename B::Params& params, typename B::State& state, const BehaviourInput& input, std::uint32_t index);
+  Cue step(const typename B::Params& params, typename B::State& state, const BehaviourInput& input,
+           std::uint32_t index);
 
   LockstepOptions options_;
   Simulator simulator_;

@@ -80,7 +80,8 @@ std::vector<Result> timing_results(const RunSummary& run, double allowed_miss_sh
   results.push_back({"skipped control releases", static_cast<double>(run.skipped), "", "", true});
   const bool faults_matter = run.real_time;
   const auto faults = [&](const char* name, std::uint64_t n) {
-    return faults_matter ? at_most(name, static_cast<double>(n), "", 0) : Result{name, static_cast<double>(n), "", "", true};
+    return faults_matter ? at_most(name, static_cast<double>(n), "", 0)
+                         : Result{name, static_cast<double>(n), "", "", true};
   };
   results.push_back(faults("minor page faults in real-time threads", run.minor_faults));
   results.push_back(faults("major page faults in real-time threads", run.major_faults));

@@ -52,7 +52,8 @@ FlightGlance FlyMonitor::look() {
   glance.ticks = run.ticks;
   glance.misses = run.deadline_misses + run.skipped;
   if (const auto* stages = find_block<scheduling::StageTable>(*flight_, shm::kStages, "StageTable"))
-    for (std::uint32_t i = 0; i < std::min<std::uint32_t>(stages->count.load(), scheduling::StageTable::kMaxStages); ++i)
+    for (std::uint32_t i = 0; i < std::min<std::uint32_t>(stages->count.load(), scheduling::StageTable::kMaxStages);
+         ++i)
       if (stages->stages[i].stage_view() == "end to end")
         glance.worst_ns = std::max<long long>(glance.worst_ns, stages->stages[i].histogram.max_ns());
   return glance;
@@ -64,8 +65,9 @@ std::string progress_line(const FlightGlance& g, double elapsed_s, double expect
   const double part = expected_s > 0 ? std::clamp(elapsed_s / expected_s, 0.0, 1.0) : 0.0;
   const int bars = static_cast<int>(part * 20 + 0.5);
   std::string truth = g.truth_known ? fmt::format(" (truth {:.3f})", g.truth_m) : "";
-  return fmt::format("[{:<20}] {:5.1f} s  {:<8.8} set {:.2f} m  height {:.3f} m{}  worst {}  missed {}", std::string(static_cast<std::size_t>(bars), '#'),
-                     elapsed_s, control::name_of(phase), g.setpoint_m, g.height_m, truth, duration_text(g.worst_ns), g.misses);
+  return fmt::format("[{:<20}] {:5.1f} s  {:<8.8} set {:.2f} m  height {:.3f} m{}  worst {}  missed {}",
+                     std::string(static_cast<std::size_t>(bars), '#'), elapsed_s, control::name_of(phase), g.setpoint_m,
+                     g.height_m, truth, duration_text(g.worst_ns), g.misses);
 }
 
 }  // namespace wasp::tools

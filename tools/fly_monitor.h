@@ -11,13 +11,13 @@ namespace wasp::tools {
 /// What the progress line shows.
 struct FlightGlance {
   bool attached = false;
-  bool commanding = false;   ///< a command was seen
+  bool commanding = false;  ///< a command was seen
   int mission_phase = 0;
   double in_phase_s = 0;
   double height_m = 0, setpoint_m = 0, truth_m = 0;
   bool truth_known = false;
   unsigned long long ticks = 0, misses = 0;
-  long long worst_ns = 0;    ///< longest exposure-to-byte so far
+  long long worst_ns = 0;  ///< longest exposure-to-byte so far
 };
 
 class FlyMonitor {

@@ -15,21 +15,26 @@ std::string default_name(const FlyOptions& o) {
 }
 
 bool plain(const std::string& name) {
-  return !name.empty() && name.size() <= 60 && name.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_") == std::string::npos;
+  return !name.empty() && name.size() <= 60 &&
+         name.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_") ==
+             std::string::npos;
 }
 
 }  // namespace
 
 std::optional<int> parse_fly_options(int argc, char** argv, FlyOptions& o) {
-  CLI::App app{"Flies a mission with the real-time flight process: in the simulator (default), or on a recording with\n"
-               "--replay. Writes OUT/NAME/ with log/ and report.html. Exit code 0 only if the mission succeeded and no\n"
-               "deadline was missed beyond what the run allows."};
+  CLI::App app{
+      "Flies a mission with the real-time flight process: in the simulator (default), or on a recording with\n"
+      "--replay. Writes OUT/NAME/ with log/ and report.html. Exit code 0 only if the mission succeeded and no\n"
+      "deadline was missed beyond what the run allows."};
   app.name("wasp fly");
   app.option_defaults()->always_capture_default();
-  app.add_option("--mission", o.mission, "take off, hold each configured height, land")->check(CLI::IsMember({"hover"}));
+  app.add_option("--mission", o.mission, "take off, hold each configured height, land")
+      ->check(CLI::IsMember({"hover"}));
   app.add_option("--seconds", o.seconds, "total time in flight, shared among the heights (0: as configured, 80 s)")
       ->check(CLI::Range(0.0, 86400.0));
-  app.add_option("--replay", o.replay, "fly on this recording, looped if --seconds asks for more; 'example' makes and flies one");
+  app.add_option("--replay", o.replay,
+                 "fly on this recording, looped if --seconds asks for more; 'example' makes and flies one");
   app.add_flag("--record", o.record, "keep camera frames too: OUT/NAME/recording/ can be given to --replay");
   app.add_option("--config", o.config, "TOML file whose keys override the defaults")->check(CLI::ExistingFile);
   app.add_option("--name", o.name, "name of the run and its folder (default: mission and time)");
@@ -37,7 +42,8 @@ std::optional<int> parse_fly_options(int argc, char** argv, FlyOptions& o) {
   app.add_option("--seed", o.seed, "seed of the simulated world and noise");
   app.add_flag("--no-rt", o.no_rt, "do not ask for real time; every figure is marked 'not real time'");
   app.add_flag("--enforce", o.enforce, "refuse to fly unless real time is granted")->excludes("--no-rt");
-  app.add_flag("--strict-syscalls", o.strict_syscalls, "a real-time thread that leaves its list of system calls ends the run");
+  app.add_flag("--strict-syscalls", o.strict_syscalls,
+               "a real-time thread that leaves its list of system calls ends the run");
   app.add_flag("!--no-safety-pilot", o.safety_pilot, "no simulated pilot who keeps the vehicle over its place");
   app.add_flag("--json", o.json, "print results as JSON, one object a line");
   try {

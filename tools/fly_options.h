@@ -14,11 +14,11 @@ struct FlyOptions {
   std::string name;                   ///< of the run and its folder
   std::filesystem::path out = "out";  ///< parent of the run's folder
   std::string mission = "hover";
-  double seconds = 0;                 ///< total flight time, 0: as configured
+  double seconds = 0;  ///< total flight time, 0: as configured
   std::uint64_t seed = 1;
-  bool no_rt = false;                 ///< never ask for real time
-  bool enforce = false;               ///< refuse to fly without it
-  bool record = false;                ///< keep frames too
+  bool no_rt = false;    ///< never ask for real time
+  bool enforce = false;  ///< refuse to fly without it
+  bool record = false;   ///< keep frames too
   bool strict_syscalls = false;
   bool json = false;
   bool safety_pilot = true;

@@ -30,7 +30,8 @@ concept Behaviour = requires(const typename B::Params& params, const BehaviourIn
   { B::kName } -> std::convertible_to<std::string_view>;
   { B::kBudgetNs } -> std::convertible_to<DurationNs>;
   { B::kStream } -> std::convertible_to<Stream>;
-  { B::step(params, input, state) } noexcept -> std::same_as<CueBody>;
+  { B::step(params, input, state) }
+  noexcept->std::same_as<CueBody>;
 };
 
 }  // namespace wasp

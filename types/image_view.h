@@ -6,7 +6,8 @@
 
 namespace wasp {
 
-/// Shape: height rows x width columns, row 0 on top. `T` is uint8_t (mono8) or uint16_t (depth, millimetres, 0 = invalid).
+/// Shape: height rows x width columns, row 0 on top. `T` is uint8_t (mono8) or uint16_t (depth, millimetres, 0 =
+/// invalid).
 template <class T>
 struct ImageView {
   const T* data = nullptr;

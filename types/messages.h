@@ -14,8 +14,8 @@ enum class PixelFormat : std::uint32_t { kNone = 0, kMono8 = 1, kDepth16Mm = 2 }
 
 /// Head of a frame slot; the pixels follow at `kFramePixelOffset`.
 struct FrameHeader {
-  TimeNs exposed_at_ns = 0;       ///< mid-exposure where the driver can know it
-  std::uint32_t sequence = 0;     ///< the camera's own count; a gap is a dropped frame
+  TimeNs exposed_at_ns = 0;    ///< mid-exposure where the driver can know it
+  std::uint32_t sequence = 0;  ///< the camera's own count; a gap is a dropped frame
   PixelFormat format = PixelFormat::kNone;
   std::uint32_t width_px = 0, height_px = 0, stride_bytes = 0;
   std::uint32_t reserved[7] = {};
@@ -49,14 +49,15 @@ static_assert(sizeof(AttitudeSample) == 64);
 
 enum class Validity : std::uint8_t { kBlind = 0, kValid = 1 };
 
-/// What a behaviour says after one frame. Fields a behaviour does not speak of stay NaN-free at zero with their bit clear.
+/// What a behaviour says after one frame. Fields a behaviour does not speak of stay NaN-free at zero with their bit
+/// clear.
 struct CueBody {
   Validity validity = Validity::kBlind;
   std::uint8_t has_height = 0, has_heading_rate = 0, has_pitch = 0, avoid = 0;
   std::uint8_t reserved[3] = {};
-  float quality = 0;            ///< 0 ... 1
-  float height_m = 0;           ///< above the ground, along the world vertical
-  float height_sigma_m = 0;     ///< one standard deviation
+  float quality = 0;         ///< 0 ... 1
+  float height_m = 0;        ///< above the ground, along the world vertical
+  float height_sigma_m = 0;  ///< one standard deviation
   float heading_rate_radps = 0;
   float pitch_rad = 0;
   std::array<float, 8> detail{};  ///< behaviour-specific, named in its header; for logs and figures only
@@ -64,16 +65,16 @@ struct CueBody {
 
 /// A cue in its ring: the body, the inputs that made it, and the three parts of its latency.
 struct Cue {
-  TimeNs exposed_at_ns = 0;   ///< of the frame it was computed from
-  TimeNs released_at_ns = 0;  ///< frame published
-  TimeNs started_at_ns = 0;   ///< behaviour thread running
-  TimeNs finished_at_ns = 0;  ///< step returned
+  TimeNs exposed_at_ns = 0;     ///< of the frame it was computed from
+  TimeNs released_at_ns = 0;    ///< frame published
+  TimeNs started_at_ns = 0;     ///< behaviour thread running
+  TimeNs finished_at_ns = 0;    ///< step returned
   std::uint32_t behaviour = 0;  ///< index in the behaviour list of this process
   std::uint32_t frame_sequence = 0;
   std::uint32_t step_index = 0;  ///< counts this behaviour's steps since start
   std::uint32_t attitude_valid = 0;
-  std::array<float, 4> q_ned_body{1, 0, 0, 0};   ///< attitude the step was given
-  std::array<float, 3> rate_body_radps{};        ///< and its rates
+  std::array<float, 4> q_ned_body{1, 0, 0, 0};  ///< attitude the step was given
+  std::array<float, 3> rate_body_radps{};       ///< and its rates
   std::uint32_t over_budget = 0;
   CueBody body;
 };
@@ -83,8 +84,21 @@ enum class FlightMode : std::uint8_t { kDisarmed = 0, kHold = 1, kBehaviour = 2,
 
 /// Why the flight mode is what it is (the latest transition).
 enum class ModeReason : std::uint8_t {
-  kNone = 0, kStart, kMissionStep, kCueLost, kCueBack, kAttitudeLost, kAttitudeBack, kLinkLost, kLinkBack, kPilot,
-  kNotFinite, kAutopilotLeft, kDeadlineMissed, kStopRequested, kLanded,
+  kNone = 0,
+  kStart,
+  kMissionStep,
+  kCueLost,
+  kCueBack,
+  kAttitudeLost,
+  kAttitudeBack,
+  kLinkLost,
+  kLinkBack,
+  kPilot,
+  kNotFinite,
+  kAutopilotLeft,
+  kDeadlineMissed,
+  kStopRequested,
+  kLanded,
 };
 
 /// One control tick: what was commanded and how long it took.
@@ -93,15 +107,15 @@ struct Command {
   TimeNs due_at_ns = 0;           ///< intended release on the grid
   TimeNs released_at_ns = 0;      ///< thread running
   TimeNs computed_at_ns = 0;
-  TimeNs written_at_ns = 0;       ///< last byte handed to the tty; 0 if not all of it was
-  std::uint64_t tick = 0;         ///< index on the grid; a jump by n+1 means n skipped releases
+  TimeNs written_at_ns = 0;  ///< last byte handed to the tty; 0 if not all of it was
+  std::uint64_t tick = 0;    ///< index on the grid; a jump by n+1 means n skipped releases
   std::array<float, 4> q_ned_body{1, 0, 0, 0};
   float yaw_rate_radps = 0;
-  float thrust = 0;               ///< 0 ... 1 of full collective
+  float thrust = 0;  ///< 0 ... 1 of full collective
   float height_setpoint_m = 0;
-  float height_m = 0;             ///< control's own filtered estimate
+  float height_m = 0;  ///< control's own filtered estimate
   float climb_rate_mps = 0;
-  std::int32_t cue_source = -1;   ///< behaviour index whose height was used, -1 none
+  std::int32_t cue_source = -1;  ///< behaviour index whose height was used, -1 none
   FlightMode mode = FlightMode::kDisarmed;
   ModeReason reason = ModeReason::kNone;
   std::uint8_t sent = 0;
@@ -115,7 +129,7 @@ struct Truth {
   std::array<float, 3> velocity_ned_mps{};
   std::array<float, 4> q_ned_body{1, 0, 0, 0};
   std::array<float, 3> rate_body_radps{};
-  float height_m = 0;       ///< of the vehicle's reference point (camera) above what is below it
+  float height_m = 0;  ///< of the vehicle's reference point (camera) above what is below it
   float armed = 0;
 };
 

@@ -11,7 +11,8 @@
 namespace wasp::control {
 namespace {
 
-/// Point mass under thrust with a first-order motor, a 30 Hz height sensor with delay and noise, a biased accelerometer.
+/// Point mass under thrust with a first-order motor, a 30 Hz height sensor with delay and noise, a biased
+/// accelerometer.
 struct Loop {
   AltitudeHoldParams hold;
   HeightFilterParams filter;

@@ -53,7 +53,8 @@ TEST_F(ArbiterTest, ACueMadeOverBudgetIsAbsent) {
 }
 
 TEST_F(ArbiterTest, NothingNonFinitePasses) {
-  for (float CueBody::*field : {&CueBody::height_m, &CueBody::height_sigma_m, &CueBody::heading_rate_radps, &CueBody::pitch_rad})
+  for (float CueBody::*field :
+       {&CueBody::height_m, &CueBody::height_sigma_m, &CueBody::heading_rate_radps, &CueBody::pitch_rad})
     for (const float bad : {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
       give(0, height_cue(0, 1.f));
       set.cues[0].body.*field = bad;

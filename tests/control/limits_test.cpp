@@ -33,7 +33,10 @@ TEST(Limits, NonFiniteIsRefusedAndChangesNothing) {
   for (const float bad : {kNan, kInf, -kInf})
     for (int field = 0; field < 4; ++field) {
       Setpoint wanted, s = before;
-      (field == 0 ? wanted.roll_rad : field == 1 ? wanted.pitch_rad : field == 2 ? wanted.yaw_rate_radps : wanted.thrust) = bad;
+      (field == 0   ? wanted.roll_rad
+       : field == 1 ? wanted.pitch_rad
+       : field == 2 ? wanted.yaw_rate_radps
+                    : wanted.thrust) = bad;
       EXPECT_FALSE(limit(LimitParams{}, wanted, 0.05f, s));
       EXPECT_EQ(s.thrust, before.thrust);
       EXPECT_EQ(s.roll_rad, before.roll_rad);

@@ -46,8 +46,8 @@ TEST(Mission, FliesEveryLegLandsAndDisarms) {
   Obedient v = standing();
   v.run(400);
   const auto leg = [](int i) { return static_cast<MissionPhase>(static_cast<int>(MissionPhase::kLeg0) + i); };
-  EXPECT_EQ(v.phases, (std::vector<MissionPhase>{MissionPhase::kArm, leg(0), leg(1), MissionPhase::kLand, MissionPhase::kDisarm,
-                                                 MissionPhase::kDone}));
+  EXPECT_EQ(v.phases, (std::vector<MissionPhase>{MissionPhase::kArm, leg(0), leg(1), MissionPhase::kLand,
+                                                 MissionPhase::kDisarm, MissionPhase::kDone}));
   EXPECT_FALSE(v.input.armed);
 }
 

@@ -2,13 +2,17 @@
 // out, and what must be refused, is refused by name. Accuracy is judged on virtual time in lockstep_hover_test.cpp.
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <cstdlib>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <random>
+#include <span>
 #include <sstream>
 
 #include "drivers/image_file.h"
 #include "shm/region.h"
+#include "shm/topics.h"
 #include "tests/tools/program.h"
 #include "tools/csv_table.h"
 
@@ -41,6 +45,55 @@ std::map<std::string, std::string> cue_bodies(const fs::path& csv) {
   return bodies;
 }
 
+/// A serial line with nobody sensible at the other end.
+class PseudoTerminal {
+ public:
+  explicit PseudoTerminal(const fs::path& link) : master_(posix_openpt(O_RDWR | O_NOCTTY)) {
+    grantpt(master_);
+    unlockpt(master_);
+    fs::create_symlink(ptsname(master_), link);
+    slave_ = open(ptsname(master_), O_RDWR | O_NOCTTY);  // keeps the line alive while nobody else has it open
+    fcntl(master_, F_SETFL, O_NONBLOCK);
+  }
+  ~PseudoTerminal() {
+    close(slave_);
+    close(master_);
+  }
+  PseudoTerminal(const PseudoTerminal&) = delete;
+  PseudoTerminal& operator=(const PseudoTerminal&) = delete;
+  /// Writes what fits, throws away what came.
+  void write(std::span<const std::uint8_t> bytes) {
+    if (::write(master_, bytes.data(), bytes.size()) < 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    std::array<char, 4096> sink;
+    while (::read(master_, sink.data(), sink.size()) > 0) {
+    }
+  }
+
+ private:
+  int master_, slave_ = -1;
+};
+
+/// A camera that offers its streams and never shows a frame.
+class CameraOfNothing {
+ public:
+  explicit CameraOfNothing(const std::string& instance) : name_(shm::camera_region(instance)), region_(shm::Region::create(name_, topics())) {}
+  ~CameraOfNothing() { shm::Region::remove(name_); }
+  CameraOfNothing(const CameraOfNothing&) = delete;
+  CameraOfNothing& operator=(const CameraOfNothing&) = delete;
+
+ private:
+  static std::vector<shm::TopicSpec> topics() {
+    return {{shm::kGray, "Frame", shm::TopicKind::kRing, 4, 4096}, {shm::kDepth, "Frame", shm::TopicKind::kRing, 4, 4096}};
+  }
+  std::string name_;
+  shm::Region region_;
+};
+
+void write_flight_config(const fs::path& path, const fs::path& tty, bool enforce) {
+  std::ofstream(path) << "[run]\nenforce_real_time = " << (enforce ? "true" : "false") << "\n[autopilot]\nendpoint = \"serial:"
+                      << tty.string() << ":115200\"\n[mission]\npatience_s = 3.0\n";
+}
+
 TEST(Fly, RecordsReportsAndItsReplayGivesTheSameCuesToTheBit) {
   TemporaryFolder out;
   const std::string name = unique("rec"), again = unique("rep");
@@ -68,8 +121,10 @@ TEST(Fly, RecordsReportsAndItsReplayGivesTheSameCuesToTheBit) {
   const auto replayed = cue_bodies(out.path / again / "log/cues.csv");
   // What the recorder lost (it says so) cannot be replayed; without loss every cue must come back to the bit.
   std::uint64_t lost_count = 0;
-  for (const auto& topic : lost["topics"]) lost_count += topic["lost"].get<std::uint64_t>() + topic["before_attach"].get<std::uint64_t>();
-  if (lost_count > 0) GTEST_SKIP() << "the recorder lost " << lost_count << " samples on this busy host: " << lost.dump();
+  for (const auto& topic : lost["topics"])
+    lost_count += topic["lost"].get<std::uint64_t>() + topic["before_attach"].get<std::uint64_t>();
+  if (lost_count > 0)
+    GTEST_SKIP() << "the recorder lost " << lost_count << " samples on this busy host: " << lost.dump();
   EXPECT_EQ(live, replayed);
 }
 
@@ -91,7 +146,8 @@ TEST(Fly, InterruptLandsInOrderAndStillWritesTheReport) {
 TEST(Fly, RealTimeThreadsAllocateNothingAndKeepToTheirSystemCalls) {
   TemporaryFolder out;
   const std::string name = unique("strict");
-  const std::string guard = std::string("LD_PRELOAD=") + WASP_BINARY_DIR + "/lib/libwasp_malloc_guard.so WASP_MALLOC_GUARD_OUT=" + (out.path / "guard.txt").string();
+  const std::string guard = std::string("LD_PRELOAD=") + WASP_BINARY_DIR +
+                            "/lib/libwasp_malloc_guard.so WASP_MALLOC_GUARD_OUT=" + (out.path / "guard.txt").string();
   const auto [text, code] = run_shell(guard + " " + fly(out, name, "--seconds 4 --strict-syscalls"));
   const std::string log = read_text(out.path / name / "log/flight.txt");
   EXPECT_NE(log.find("mission flown to its end"), std::string::npos) << text << log;  // SIGSYS would have ended it
@@ -185,16 +241,56 @@ TEST(FlyRefuses, ATruncatedRecording) {
 TEST(FlyRefuses, ASerialLineThatIsNotThere) {
   TemporaryFolder out;
   std::ofstream(out.path / "c.toml") << "[autopilot]\nendpoint = \"serial:/dev/nothing-here:57600\"\n";
-  expect_refusal(kWasp + " flight --no-rt --instance " + unique("line") + " --config " + (out.path / "c.toml").string() + " 2>&1", "/dev/nothing-here");
+  expect_refusal(
+      kWasp + " flight --no-rt --instance " + unique("line") + " --config " + (out.path / "c.toml").string() + " 2>&1",
+      "/dev/nothing-here");
   std::ofstream(out.path / "c.toml") << "[autopilot]\nendpoint = \"serial:/dev/null:1234\"\n";
-  expect_refusal(kWasp + " flight --no-rt --instance " + unique("line") + " --config " + (out.path / "c.toml").string() + " 2>&1", "1234");
+  expect_refusal(
+      kWasp + " flight --no-rt --instance " + unique("line") + " --config " + (out.path / "c.toml").string() + " 2>&1",
+      "1234");
+}
+
+TEST(FlyRefuses, ToArmWithoutRealTimeUnlessTheConfigurationAllowsIt) {
+  TemporaryFolder out;
+  const std::string instance = unique("enforce");
+  const PseudoTerminal line(out.path / "tty");
+  const CameraOfNothing camera(instance);
+  write_flight_config(out.path / "c.toml", out.path / "tty", true);
+  expect_refusal(kWasp + " flight --no-rt --instance " + instance + " --config " + (out.path / "c.toml").string() + " 2>&1",
+                 "enforce_real_time");
+  shm::Region::remove(shm::flight_region(instance));
+}
+
+TEST(Fly, AFloodOfGarbageIsSurvivedAndNeverArms) {
+  TemporaryFolder out;
+  const std::string instance = unique("flood");
+  PseudoTerminal line(out.path / "tty");
+  const CameraOfNothing camera(instance);
+  write_flight_config(out.path / "c.toml", out.path / "tty", false);
+  std::atomic<bool> stop{false};
+  std::thread flood([&] {
+    std::mt19937 random(99);
+    std::array<std::uint8_t, 512> noise{};
+    while (!stop) {
+      for (auto& b : noise) b = static_cast<std::uint8_t>(random() % 3 == 0 ? 0xFD : random());
+      line.write(noise);
+    }
+  });
+  const auto [text, code] = run_shell(kWasp + " flight --no-rt --instance " + instance + " --config " + (out.path / "c.toml").string() + " 2>&1");
+  stop = true;
+  flood.join();
+  EXPECT_EQ(code, 1) << text;
+  EXPECT_NE(text.find("mission broken off"), std::string::npos) << text;
+  EXPECT_EQ(text.find("flight mode: behaviour"), std::string::npos) << text;
+  shm::Region::remove(shm::flight_region(instance));
 }
 
 TEST(Fly, TheSimulatorDyingIsSaidAndTheReportIsStillWritten) {
   TemporaryFolder out;
   const std::string name = unique("simdies");
   Program program({kWasp, "fly", "--no-rt", "--json", "--out", out.path.string(), "--name", name, "--seconds", "600"});
-  ASSERT_TRUE(eventually([&] { return read_text(out.path / name / "log/commands.csv").find(",behaviour,") != std::string::npos; }));
+  ASSERT_TRUE(eventually(
+      [&] { return read_text(out.path / name / "log/commands.csv").find(",behaviour,") != std::string::npos; }));
   run_shell("pkill -KILL -f -- 'wasp-sim --instance " + name + " '");
   EXPECT_NE(program.wait(), 0);
   EXPECT_TRUE(fs::exists(out.path / name / "report.html"));

@@ -28,7 +28,8 @@ const std::map<std::string, std::set<std::string>> kMayInclude = {
 };
 
 /// Violations in one file, as "file includes folder".
-std::vector<std::string> violations(const fs::path& file, const std::string& folder, const std::set<std::string>& allowed) {
+std::vector<std::string> violations(const fs::path& file, const std::string& folder,
+                                    const std::set<std::string>& allowed) {
   static const std::regex kInclude(R"re(^\s*#\s*include\s*"([a-z_]+)/)re");
   std::vector<std::string> found;
   std::ifstream in(file);
@@ -36,7 +37,8 @@ std::vector<std::string> violations(const fs::path& file, const std::string& fol
     std::smatch m;
     if (!std::regex_search(line, m, kInclude)) continue;
     const std::string target = m[1];
-    if (target != folder && kMayInclude.contains(target) && !allowed.contains(target)) found.push_back(file.string() + ": " + line);
+    if (target != folder && kMayInclude.contains(target) && !allowed.contains(target))
+      found.push_back(file.string() + ": " + line);
   }
   return found;
 }
