@@ -11,6 +11,7 @@
 
 #include <cerrno>
 #include <cstdint>
+#include <array>
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
@@ -52,16 +53,22 @@ bool memlock_permitted(std::size_t bytes) {
 
 }  // namespace
 
+std::string grant_command() {
+  std::array<char, 4096> path{};
+  const ssize_t n = readlink("/proc/self/exe", path.data(), path.size() - 1);
+  return std::string("sudo setcap cap_sys_nice,cap_ipc_lock=ep ") + (n > 0 ? path.data() : "the program");
+}
+
 std::vector<MissingRight> missing_rights(int priority) {
   std::vector<MissingRight> missing;
   if (!fifo_permitted(priority))
     missing.push_back({"SCHED_FIFO priority " + std::to_string(priority) + " (CAP_SYS_NICE or rtprio limit)",
-                       "sudo setcap cap_sys_nice,cap_ipc_lock=ep build/wasp"});
+                       grant_command()});
   const std::size_t needed_bytes = memlock_needed_bytes();
   if (!memlock_permitted(needed_bytes))
     missing.push_back(
         {"locked memory (CAP_IPC_LOCK or memlock limit, " + std::to_string(needed_bytes >> 20) + " MiB needed)",
-         "sudo setcap cap_sys_nice,cap_ipc_lock=ep build/wasp, or 'ulimit -l unlimited'"});
+         grant_command() + ", or 'ulimit -l unlimited'"});
   return missing;
 }
 

@@ -13,6 +13,9 @@ struct MissingRight {
   std::string remedy;
 };
 
+/// The command that grants this program SCHED_FIFO and locked memory.
+std::string grant_command();
+
 /// Checks, without changing anything that lasts: SCHED_FIFO at `priority`, and enough memlock for a locked process.
 std::vector<MissingRight> missing_rights(int priority);
 

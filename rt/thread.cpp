@@ -1,5 +1,7 @@
 #include "rt/thread.h"
 
+#include "rt/process.h"
+
 #include <sched.h>
 #include <sys/syscall.h>
 #include <unistd.h>
@@ -93,7 +95,7 @@ int describe(const ThreadSpec& spec, pthread_attr_t& attr) {
                             : " is not admitted (runtime <= deadline <= period, and the cores' capacity)");
   } else if (error == EPERM) {
     what += "SCHED_FIFO priority " + std::to_string(spec.priority) +
-            " is not permitted; grant CAP_SYS_NICE (sudo setcap cap_sys_nice,cap_ipc_lock=ep build/wasp) or an rtprio "
+            " is not permitted; grant CAP_SYS_NICE (" + grant_command() + ") or an rtprio "
             "limit (/etc/security/limits.d: '@realtime - rtprio 95')";
   } else if (error == EINVAL) {
     what += "core " + std::to_string(spec.core) + ", priority " + std::to_string(spec.priority) + " or a stack of " +

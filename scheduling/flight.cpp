@@ -25,6 +25,7 @@ struct Options {
   std::string replay;
   double seconds = 0;
   bool no_rt = false;
+  bool check_rights = false;
 };
 
 void log(const char* text) { std::fprintf(stderr, "%10.3f  %s\n", to_seconds(rt::now()), text); }
@@ -227,6 +228,7 @@ std::optional<int> parse(int argc, char** argv, Options& o) {
   app.add_option("--replay", o.replay, "take frames from this recording");
   app.add_option("--seconds", o.seconds, "length of a replay (0: once through)");
   app.add_flag("--no-rt", o.no_rt, "ordinary scheduling, no locked memory; every figure is marked 'not real time'");
+  app.add_flag("--check-rights", o.check_rights, "only say which rights real time lacks; exit code 3 if any");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
@@ -237,9 +239,21 @@ std::optional<int> parse(int argc, char** argv, Options& o) {
 
 }  // namespace
 
+namespace {
+
+/// Prints what is missing, one line a right.
+int check_rights(int priority) {
+  const auto missing = rt::missing_rights(priority);
+  for (const auto& m : missing) std::printf("missing right: %s; grant it with: %s\n", m.right.c_str(), m.remedy.c_str());
+  return missing.empty() ? 0 : 3;
+}
+
+}  // namespace
+
 int flight_main(const BehaviourTable& behaviours, int argc, char** argv) {
   Options options;
   if (const auto code = parse(argc, argv, options)) return *code;
+  if (options.check_rights) return check_rights(Config{}.control_thread.priority);
   const sigset_t signals = block_signals();
   try {
     Flight flight(behaviours, options, load_config(options.configs, names_of(behaviours)));

@@ -92,20 +92,24 @@ void write_override(Run& run) {
   write_text(run.folder / "override.toml", text);
 }
 
+/// Asks the flight binary itself, for the rights may have been granted to it alone.
 void check_rights(Run& run) {
   if (run.options.no_rt) {
     run.note = "real time was not asked for (--no-rt)";
     return;
   }
-  const auto missing = rt::missing_rights(80);
-  run.real_time = missing.empty();
-  for (const auto& m : missing) {
-    const std::string line = "missing right: " + m.right + "; grant it with: " + m.remedy;
+  const fs::path answer = run.folder / "log/rights.txt";
+  ChildProcess asked({program("wasp"), "flight", "--check-rights"}, answer.string());
+  while (!asked.poll()) rt::sleep_until(rt::now() + 5 * kMillisecond);
+  run.real_time = asked.poll() == 0;
+  if (run.real_time) return;
+  std::ifstream file(answer);
+  for (std::string line; std::getline(file, line);) {
     if (run.options.enforce) throw std::runtime_error(line);
     std::cerr << "warning: " << line << "\n";
-    run.note = "falls back to --no-rt: " + m.right + " missing";
+    run.note += (run.note.empty() ? "" : "; ") + line;
   }
-  if (!run.real_time) std::cerr << "warning: this flight is NOT REAL TIME; every figure is marked so\n";
+  std::cerr << "warning: this flight is NOT REAL TIME; every figure is marked so\n";
 }
 
 std::vector<std::string> flight_arguments(const Run& run) {
@@ -331,12 +335,12 @@ int fly(FlyOptions options) {
   run.options = std::move(options);
   run.folder = run.options.out / run.options.name;
   run.instance = run.options.name;
-  if (fs::exists(run.folder / "run.json") || fs::exists(run.folder / "log"))
+  if (fs::exists(run.folder / "run.json") || fs::exists(run.folder / "log/imu.csv"))
     throw std::runtime_error(run.folder.string() +
                              " holds an earlier run; choose another --name (nothing is overwritten)");
   if (!run.options.replay.empty()) plan_replay(run);
-  check_rights(run);
   fs::create_directories(run.folder / "log");
+  check_rights(run);
   write_override(run);
   write_camera_toml(run);
   int flight_code = 1;
