@@ -54,6 +54,15 @@ drivers::LinkIdentity identity_of(const Config& config) {
   return id;
 }
 
+/// Takes a region's files away again unless told that its readers still need them.
+struct RegionFiles {
+  std::string name;
+  bool keep = false;
+  ~RegionFiles() {
+    if (!keep && !name.empty()) shm::Region::remove(name);
+  }
+};
+
 /// Everything one flight owns, in order of construction; destroyed in reverse, threads first.
 class Flight {
  public:
@@ -63,6 +72,7 @@ class Flight {
         config_(std::move(config)),
         real_time_(!options.no_rt),
         flight_(create_flight_region(options.instance, names_of(table), real_time_)),
+        flight_files_{flight_.name()},
         stages_(stage_table(flight_)),
         port_(drivers::SerialEndpoint::parse(config_.endpoint)),
         autopilot_(identity_of(config_)) {
@@ -77,6 +87,7 @@ class Flight {
     prepare_real_time();
     start_threads();
     control_.realtime_started = true;
+    flight_files_.keep = camera_files_.keep = true;  // the recorder drains them; the launcher removes them
     log(real_time_ ? "armed for real time" : "running, NOT REAL TIME");
     supervise(signals);
     return conclude();
@@ -98,6 +109,7 @@ class Flight {
     config_.control.mission.recording_seconds = static_cast<float>(seconds);
     camera_ = std::make_unique<shm::Region>(
         shm::Region::create(shm::camera_region(options_.instance), ReplayCamera::topics(recording)));
+    camera_files_.name = camera_->name();
     replay_ = std::make_unique<ReplayCamera>(std::move(recording), *camera_, from_seconds(seconds), stages_);
   }
 
@@ -128,7 +140,8 @@ class Flight {
   /// Locks memory and keeps the processor awake; refuses by name where a right is missing.
   void prepare_real_time() {
     if (!real_time_ && config_.enforce_real_time)
-      throw std::runtime_error("refusing to arm: --no-rt was given, but the configuration says [run] enforce_real_time = true");
+      throw std::runtime_error(
+          "refusing to arm: --no-rt was given, but the configuration says [run] enforce_real_time = true");
     if (!real_time_) return;
     std::string refusal;
     for (const auto& m : rt::missing_rights(config_.control_thread.priority))
@@ -201,6 +214,7 @@ class Flight {
   Config config_;
   bool real_time_;
   shm::Region flight_;
+  RegionFiles flight_files_, camera_files_;  // a flight that never began leaves nothing behind
   StageTable& stages_;
   drivers::SerialPort port_;
   drivers::AutopilotLink autopilot_;
@@ -244,7 +258,8 @@ namespace {
 /// Prints what is missing, one line a right.
 int check_rights(int priority) {
   const auto missing = rt::missing_rights(priority);
-  for (const auto& m : missing) std::printf("missing right: %s; grant it with: %s\n", m.right.c_str(), m.remedy.c_str());
+  for (const auto& m : missing)
+    std::printf("missing right: %s; grant it with: %s\n", m.right.c_str(), m.remedy.c_str());
   return missing.empty() ? 0 : 3;
 }
 

@@ -76,12 +76,20 @@ bool Attachment::left_over() const {
   return region_ && writer_was_dead_ && region_->header().writer_restarts.load() == restarts_;
 }
 
+bool is_written(const std::string& region) {
+  try {
+    return shm::Region::attach(region).writer_alive();
+  } catch (const std::exception&) {
+    return false;  // went away, or is still being built
+  }
+}
+
 std::vector<std::string> list_instances() {
   std::vector<std::string> names;
   for (const std::string& region : shm::Region::list("wasp.")) {
     const std::size_t dot = region.rfind('.');
     const std::string_view tail = std::string_view(region).substr(dot);
-    if (dot > 5 && (tail == ".flight" || tail == ".camera" || tail == ".truth"))
+    if (dot > 5 && (tail == ".flight" || tail == ".camera" || tail == ".truth") && is_written(region))
       names.push_back(region.substr(5, dot - 5));
   }
   std::sort(names.begin(), names.end());

@@ -57,6 +57,7 @@ class Attachment {
 };
 
 /// Instances that have at least one region: the X of "wasp.X.flight", ".camera" or ".truth". Sorted, each once.
+bool is_written(const std::string& region);  ///< a living process writes it
 std::vector<std::string> list_instances();
 
 }  // namespace wasp::tools
