@@ -167,6 +167,27 @@ std::optional<Listing> list_hover(const fs::path& folder, const Names& names) {
   return listing;
 }
 
+/// A folder of such clips, played one after the other in order of their frame numbers, a second apart.
+std::optional<Listing> list_hover_clips(const fs::path& folder, const Names&) {
+  std::map<std::uint32_t, Listing> clips;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder))
+    if (entry.is_directory())
+      if (auto clip = list_hover(entry.path(), file_names(entry.path())))
+        clips.emplace(clip->frames.front().sequence, *std::move(clip));
+  if (clips.empty()) return std::nullopt;
+  Listing all = clips.begin()->second;
+  all.layout = "hover_mocap_clips";
+  for (auto next = std::next(clips.begin()); next != clips.end(); ++next) {
+    const DurationNs shift_ns = all.frames.back().time_ns + kSecond - next->second.frames.front().time_ns;
+    for (ListedFrame frame : next->second.frames) {
+      frame.time_ns += shift_ns;
+      all.frames.push_back(std::move(frame));
+    }
+    all.problems.insert(all.problems.end(), next->second.problems.begin(), next->second.problems.end());
+  }
+  return all;
+}
+
 /// The fallback: PNGs whose names end in a number; 16-bit grey counts as depth.
 std::optional<Listing> list_numbered_png(const fs::path& folder, const Names& names) {
   std::map<std::uint32_t, std::string> files;
@@ -195,7 +216,7 @@ std::optional<Listing> list_numbered_png(const fs::path& folder, const Names& na
 }
 
 constexpr std::array kLayouts = {&list_tum,         &list_7scenes, &list_tum_pair,    &list_pgm,
-                                 &list_named_depth, &list_hover,   &list_numbered_png};
+                                 &list_named_depth, &list_hover,   &list_hover_clips, &list_numbered_png};
 
 /// A folder of clips is not a recording; say which of its sub-folders are.
 [[noreturn]] void refuse(const fs::path& folder) {

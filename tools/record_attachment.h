@@ -56,8 +56,9 @@ class Attachment {
   int generation_ = 0;
 };
 
-/// Instances that have at least one region: the X of "wasp.X.flight", ".camera" or ".truth". Sorted, each once.
-bool is_written(const std::string& region);  ///< a living process writes it
+/// True while a living process writes the region.
+bool is_written(const std::string& region);
+/// Instances with at least one such region: the X of "wasp.X.flight", ".camera" or ".truth". Sorted, each once.
 std::vector<std::string> list_instances();
 
 }  // namespace wasp::tools

@@ -142,6 +142,7 @@ struct Expected {
   const char* folder;
   const char* layout;
   std::size_t entries;
+  friend void PrintTo(const Expected& e, std::ostream* out) { *out << e.folder; }
 };
 class RealRecording : public testing::TestWithParam<Expected> {};
 
@@ -173,16 +174,32 @@ INSTANTIATE_TEST_SUITE_P(Layouts, RealRecording,
                                          Expected{"hover_mocap/climb", "hover_mocap", 40},
                                          Expected{"hover_mocap/lateral_yaw", "hover_mocap", 40}));
 
-TEST(RealRecordings, AFolderOfClipsAsksForOne) {
+TEST(RealRecordings, AFolderOfClipsPlaysOneAfterTheOther) {
   const fs::path folder = WASP_SOURCE_DIR "/../shared/data/hover_mocap";
   if (!fs::exists(folder)) GTEST_SKIP() << "no recording at " << folder;
+  const Recording r = Recording::open(folder);
+  EXPECT_EQ(r.layout(), "hover_mocap_clips");
+  ASSERT_EQ(r.entries().size(), 160u);
+  EXPECT_TRUE(r.problems().empty());
+  for (std::size_t i = 1; i < r.entries().size(); ++i) {
+    EXPECT_GT(r.entries()[i].offset_ns, r.entries()[i - 1].offset_ns);
+    EXPECT_GT(r.entries()[i].sequence, r.entries()[i - 1].sequence);
+  }
+}
+
+TEST(Recordings, AFolderOfRecordingsAsksForOne) {
+  const fs::path folder = fs::temp_directory_path() / ("wasp_clips_" + std::to_string(getpid()));
+  for (const char* name : {"a", "b"}) {
+    fs::create_directories(folder / name);
+    std::ofstream(folder / name / "depth.txt") << "0.0 x.png\n";
+  }
   try {
     Recording::open(folder);
-    FAIL() << "opened";
+    ADD_FAILURE() << "opened";
   } catch (const std::runtime_error& error) {
-    EXPECT_NE(std::string(error.what()).find("climb, climb_yaw, descend, lateral_yaw"), std::string::npos)
-        << error.what();
+    EXPECT_NE(std::string(error.what()).find("name one of them: a, b"), std::string::npos) << error.what();
   }
+  fs::remove_all(folder);
 }
 
 }  // namespace

@@ -19,6 +19,7 @@ using Row = std::vector<std::string>;
 struct Log {
   const char* name;
   std::size_t frames;
+  friend void PrintTo(const Log& log, std::ostream* out) { *out << log.name; }
 };
 
 class RecordedLog : public testing::TestWithParam<Log> {
