@@ -34,7 +34,7 @@ Situation assess(const ControlParams& p, const ControlInput& in, const Intention
   now.attitude_fresh = in.attitude_present && in.now_ns - in.attitude.exposed_at_ns <= p.attitude_age_limit_ns;
   now.ground_seen = intention.height_source >= 0;
   now.ground_lost_long =
-      !now.ground_seen && (s.ground_seen_at_ns == kNever || in.now_ns - s.ground_seen_at_ns > p.ground_hold_limit_ns);
+      !now.ground_seen && s.ground_seen_at_ns != kNever && in.now_ns - s.ground_seen_at_ns > p.ground_hold_limit_ns;
   now.setpoint_finite = finite;
   now.deadlines_missed = in.deadlines_missed;
   return now;

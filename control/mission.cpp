@@ -49,7 +49,8 @@ MissionWish fly_leg(const MissionParams& p, const MissionInput& in, MissionState
   const double length_s =
       static_cast<double>(p.follow_recording ? p.recording_seconds : p.legs[static_cast<std::size_t>(leg)].seconds);
   MissionWish wish;
-  wish.rotors = true;
+  if (p.follow_recording && in.ground_seen && s.ground_height_m <= 0.f) s.ground_height_m = in.height_m;
+  wish.rotors = !p.follow_recording || s.ground_height_m > 0.f;  // a recording is followed from its first height on
   wish.armed = true;
   wish.target_m = p.follow_recording ? s.ground_height_m : p.legs[static_cast<std::size_t>(leg)].height_m;
   if (!in.armed)

@@ -60,6 +60,7 @@ void ControlLoop::tick(const rt::Release& release, LoopControl& control) WASP_RE
   commands_.write(command, rt::now());
   announce(command);
   const auto phase = state_.mission.phase;
+  if (control::leg_of(phase) >= 0) control.flying.store(true, std::memory_order_relaxed);
   if (phase == control::MissionPhase::kDone || phase == control::MissionPhase::kBroken) {
     status.mission_result.store(phase == control::MissionPhase::kDone ? 1 : 2, std::memory_order_relaxed);
     mission_over_.store(true);

@@ -19,6 +19,8 @@
 namespace wasp::scheduling {
 namespace {
 
+constexpr double kReplayTail_s = 0.3;  // the last frames' cues reach a command before the replay ends
+
 struct Options {
   std::string instance = "wasp";
   std::vector<std::string> configs;
@@ -106,11 +108,21 @@ class Flight {
     second_lap_ = ReplayCamera::lap_sequence(recording);
     const double seconds = options_.seconds > 0 ? options_.seconds : to_seconds(ReplayCamera::lap_ns(recording));
     config_.control.mission.follow_recording = true;
-    config_.control.mission.recording_seconds = static_cast<float>(seconds);
+    config_.control.mission.recording_seconds = static_cast<float>(seconds + kReplayTail_s);
+    if (recording.depth_size().width_px == 0) fly_on_grey_images();
     camera_ = std::make_unique<shm::Region>(
         shm::Region::create(shm::camera_region(options_.instance), ReplayCamera::topics(recording)));
     camera_files_.name = camera_->name();
     replay_ = std::make_unique<ReplayCamera>(std::move(recording), *camera_, from_seconds(seconds), stages_);
+  }
+
+  /// A recording without depth: behaviours that see grey images may supply the height, in their order in the table.
+  void fly_on_grey_images() {
+    log("the recording has no depth: height comes from grey images");
+    for (std::size_t i = 0; i < table_.size(); ++i) {
+      auto& rank = config_.control.arbiter.rows[i].height_rank;
+      if (table_[i].stream == Stream::kGray && rank < 0) rank = static_cast<int>(i);
+    }
   }
 
   void wire() {

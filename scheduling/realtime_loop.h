@@ -15,6 +15,7 @@ struct LoopControl {
   std::atomic<bool> stop{false};              ///< end all loops
   std::atomic<bool> stop_requested{false};    ///< land in order, then end
   std::atomic<bool> realtime_started{false};  ///< set once every thread stands: faults count from here
+  std::atomic<bool> flying{false};            ///< set once the mission has left the ground: a replay starts then
   bool strict_syscalls = false;
   RunStatus* status = nullptr;
 };

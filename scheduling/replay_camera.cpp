@@ -121,7 +121,7 @@ void ReplayCamera::run(LoopControl& control) {
   TimeNs start_ns = kNever;
   while (loop.tick()) {
     std::uint32_t slot = 0;
-    if (!control.realtime_started.load(std::memory_order_relaxed) || !pool_.take_full(slot)) {
+    if (!control.flying.load(std::memory_order_relaxed) || !pool_.take_full(slot)) {
       if (all_decoded_.load() && start_ns != kNever) break;
       rt::sleep_until(rt::now() + kMillisecond);
       continue;
