@@ -167,7 +167,7 @@ std::optional<Listing> list_hover(const fs::path& folder, const Names& names) {
   return listing;
 }
 
-/// A folder of such clips, played one after the other in order of their frame numbers, a second apart.
+/// A folder of such clips, played one after the other in order of their frame numbers, a tenth of a second apart.
 std::optional<Listing> list_hover_clips(const fs::path& folder, const Names&) {
   std::map<std::uint32_t, Listing> clips;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder))
@@ -178,7 +178,7 @@ std::optional<Listing> list_hover_clips(const fs::path& folder, const Names&) {
   Listing all = clips.begin()->second;
   all.layout = "hover_mocap_clips";
   for (auto next = std::next(clips.begin()); next != clips.end(); ++next) {
-    const DurationNs shift_ns = all.frames.back().time_ns + kSecond - next->second.frames.front().time_ns;
+    const DurationNs shift_ns = all.frames.back().time_ns + 100 * kMillisecond - next->second.frames.front().time_ns;
     for (ListedFrame frame : next->second.frames) {
       frame.time_ns += shift_ns;
       all.frames.push_back(std::move(frame));
