@@ -183,8 +183,9 @@ TEST_P(RealRecording, Replays) {
   ASSERT_TRUE(commands.has_value());
   EXPECT_GT(commands->rows(), 20u);
   const auto modes = commands->texts("mode_name");
-  if (std::string(GetParam()) != "rgbd_tum_pair")  // a desk, no floor: rightly no behaviour commands
+  if (std::string(GetParam()) != "rgbd_tum_pair") {  // a desk, no floor: rightly no behaviour commands
     EXPECT_NE(std::find(modes.begin(), modes.end(), "behaviour"), modes.end());
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Data, RealRecording,
