@@ -77,22 +77,25 @@ class PseudoTerminal {
 /// A camera that offers its streams and never shows a frame.
 class CameraOfNothing {
  public:
-  explicit CameraOfNothing(const std::string& instance) : name_(shm::camera_region(instance)), region_(shm::Region::create(name_, topics())) {}
+  explicit CameraOfNothing(const std::string& instance)
+      : name_(shm::camera_region(instance)), region_(shm::Region::create(name_, topics())) {}
   ~CameraOfNothing() { shm::Region::remove(name_); }
   CameraOfNothing(const CameraOfNothing&) = delete;
   CameraOfNothing& operator=(const CameraOfNothing&) = delete;
 
  private:
   static std::vector<shm::TopicSpec> topics() {
-    return {{shm::kGray, "Frame", shm::TopicKind::kRing, 4, 4096}, {shm::kDepth, "Frame", shm::TopicKind::kRing, 4, 4096}};
+    return {{shm::kGray, "Frame", shm::TopicKind::kRing, 4, 4096},
+            {shm::kDepth, "Frame", shm::TopicKind::kRing, 4, 4096}};
   }
   std::string name_;
   shm::Region region_;
 };
 
 void write_flight_config(const fs::path& path, const fs::path& tty, bool enforce) {
-  std::ofstream(path) << "[run]\nenforce_real_time = " << (enforce ? "true" : "false") << "\n[autopilot]\nendpoint = \"serial:"
-                      << tty.string() << ":115200\"\n[mission]\npatience_s = 3.0\n";
+  std::ofstream(path) << "[run]\nenforce_real_time = " << (enforce ? "true" : "false")
+                      << "\n[autopilot]\nendpoint = \"serial:" << tty.string()
+                      << ":115200\"\n[mission]\npatience_s = 3.0\n";
 }
 
 TEST(Fly, RecordsReportsAndItsReplayGivesTheSameCuesToTheBit) {
@@ -261,8 +264,9 @@ TEST(FlyRefuses, ToArmWithoutRealTimeUnlessTheConfigurationAllowsIt) {
   const PseudoTerminal line(out.path / "tty");
   const CameraOfNothing camera(instance);
   write_flight_config(out.path / "c.toml", out.path / "tty", true);
-  expect_refusal(kWasp + " flight --no-rt --instance " + instance + " --config " + (out.path / "c.toml").string() + " 2>&1",
-                 "enforce_real_time");
+  expect_refusal(
+      kWasp + " flight --no-rt --instance " + instance + " --config " + (out.path / "c.toml").string() + " 2>&1",
+      "enforce_real_time");
   shm::Region::remove(shm::flight_region(instance));
 }
 
@@ -281,7 +285,8 @@ TEST(Fly, AFloodOfGarbageIsSurvivedAndNeverArms) {
       line.write(noise);
     }
   });
-  const auto [text, code] = run_shell(kWasp + " flight --no-rt --instance " + instance + " --config " + (out.path / "c.toml").string() + " 2>&1");
+  const auto [text, code] = run_shell(kWasp + " flight --no-rt --instance " + instance + " --config " +
+                                      (out.path / "c.toml").string() + " 2>&1");
   stop = true;
   flood.join();
   EXPECT_EQ(code, 1) << text;

@@ -67,10 +67,10 @@ inline std::string read_text(const std::filesystem::path& path) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-/// Polls until `done()`; false if it never came true within a minute (a test then fails, it does not hang).
+/// Polls until `done()`; false if it never came true within five minutes (a test then fails, it does not hang).
 template <class Done>
 bool eventually(Done&& done) {
-  for (int i = 0; i < 12000; ++i) {
+  for (int i = 0; i < 60000; ++i) {
     if (done()) return true;
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }

@@ -1,0 +1,41 @@
+// One run of `wasp fly`: its folder, its instance name in shared memory, its plan, and the command lines of its
+// processes.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "tools/fly_options.h"
+
+namespace wasp::tools {
+
+struct Run {
+  FlyOptions options;
+  std::filesystem::path folder;
+  std::string instance;
+  bool real_time = false;
+  std::string note;  ///< why it is not real time
+  double flight_seconds = 80;
+  std::string exit_reason;
+};
+
+/// Names folder and instance, makes the example recording if asked for, opens a recording to learn its length. Throws
+/// std::runtime_error on what cannot be flown; nothing of an earlier run is overwritten.
+Run plan_run(FlyOptions options);
+
+/// Asks the flight binary itself which rights it lacks, for they may have been granted to it alone. Warns; throws where
+/// real time is demanded.
+void check_rights(Run& run);
+
+/// Writes override.toml (endpoint, camera, mission: what this run decides) and camera.toml (for the recording).
+void write_configuration(Run& run);
+
+std::vector<std::string> flight_arguments(const Run& run);
+std::vector<std::string> sim_arguments(const Run& run);
+std::vector<std::string> recorder_arguments(const Run& run);
+
+/// Throws std::runtime_error naming the path.
+void write_text(const std::filesystem::path& path, const std::string& text);
+
+}  // namespace wasp::tools

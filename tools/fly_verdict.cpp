@@ -1,0 +1,113 @@
+#include "tools/fly_verdict.h"
+
+#include <fmt/format.h>
+
+#include <ctime>
+#include <fstream>
+#include <iostream>
+#include <nlohmann/json.hpp>
+
+#include "rt/clock.h"
+#include "rt/process.h"
+#include "tools/child_process.h"
+#include "tools/flight_results.h"
+#include "tools/latency_table.h"
+#include "tools/program_paths.h"
+
+namespace wasp::tools {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string scheduler_text(const Run& run) {
+  return run.real_time ? "SCHED_FIFO, locked memory" : "SCHED_OTHER (not real time)";
+}
+
+/// Share of control ticks that may miss: none where kernel and rights promise real time, 5 % where one of them does not
+/// (a simulation on a shared machine).
+double allowed_share(const Run& run) { return run.real_time && rt::kernel_is_preempt_rt() ? 0.0 : 0.05; }
+
+nlohmann::json run_document(const Run& run, const std::vector<Phase>& phases, const std::vector<Result>& results) {
+  nlohmann::json doc{{"name", run.options.name},
+                     {"mission", run.options.replay.empty() ? run.options.mission : "replay"},
+                     {"seconds", run.flight_seconds},
+                     {"kernel", rt::kernel_description()},
+                     {"host", rt::host_description()},
+                     {"scheduler", scheduler_text(run)},
+                     {"real_time", run.real_time},
+                     {"mode_note", run.note},
+                     {"seed", run.options.seed},
+                     {"exit_reason", run.exit_reason},
+                     {"camera", run.options.replay.empty() ? "simulated Kinect" : "recording " + run.options.replay}};
+  char stamp[40];
+  const std::time_t now = std::time(nullptr);
+  std::strftime(stamp, sizeof stamp, "%Y-%m-%dT%H:%M:%S%z", std::localtime(&now));
+  doc["started"] = stamp;
+  for (const auto& p : phases)
+    doc["phases"].push_back(
+        {{"name", p.name}, {"setpoint_m", p.setpoint_m}, {"start_ns", p.start_ns}, {"end_ns", p.end_ns}});
+  for (const auto& r : results) doc["results"].push_back(to_json(r));
+  return doc;
+}
+
+std::vector<Result> judge(const Run& run, int flight_code, const std::vector<Phase>& phases,
+                          const RunSummary& summary) {
+  std::vector<Result> results;
+  results.push_back({"flight process exit code", static_cast<double>(flight_code), "", "== 0", flight_code == 0});
+  results.push_back(
+      {"mission flown to its end", summary.mission_result == 1 ? 1.0 : 0.0, "", "== 1", summary.mission_result == 1});
+  if (run.options.replay.empty())
+    for (auto& r : hover_results(run.folder / "log", phases)) results.push_back(std::move(r));
+  for (auto& r : timing_results(summary, allowed_share(run))) results.push_back(std::move(r));
+  return results;
+}
+
+}  // namespace
+
+int conclude(Run& run, int flight_code, bool interrupted) {
+  std::vector<StageSummary> stages;
+  RunSummary summary;
+  if (std::ifstream file(run.folder / "log/stages.json"); file) {
+    const auto doc = nlohmann::json::parse(file, nullptr, false);
+    if (!doc.is_discarded()) {
+      stages = stages_from_json(doc);
+      summary = run_from_json(doc);
+    }
+  }
+  run.exit_reason = interrupted     ? "interrupted by the user, landed in order"
+                    : flight_code == 0 ? "mission ended in order"
+                                       : fmt::format("flight process ended with code {}", flight_code);
+  const auto phases = read_phases(run.folder / "log");
+  const auto results = judge(run, flight_code, phases, summary);
+  write_text(run.folder / "run.json", run_document(run, phases, results).dump(1) + "\n");
+  ChildProcess report({program("wasp-report"), run.folder.string()}, (run.folder / "log/report.txt").string());
+  const TimeNs deadline = rt::now() + 120 * kSecond;
+  while (!report.poll() && rt::now() < deadline) rt::sleep_until(rt::now() + 10 * kMillisecond);
+
+  bool ok = true;
+  if (!run.options.json)
+    std::cout << latency_table(
+        stages, rt::kernel_description() + ", " + scheduler_text(run) + ", " + rt::host_description(), run.real_time);
+  for (const auto& r : results) {
+    ok = ok && r.ok;
+    if (run.options.json) {
+      auto line = to_json(r);
+      line["real_time"] = run.real_time;
+      std::cout << line.dump() << "\n";
+    } else {
+      std::cout << fmt::format("{:<4} {:<48} {:>10.4g} {:<2} {}\n",
+                               r.bar.empty() ? ""
+                               : r.ok        ? "ok"
+                                             : "MISS",
+                               r.name, r.value, r.unit, r.bar.empty() ? "" : "bar " + r.bar);
+    }
+  }
+  if (flight_code != 0)
+    if (std::ifstream log(run.folder / "log/flight.txt"); log) std::cerr << log.rdbuf();
+  if (!run.options.json)
+    std::cout << (ok ? "mission succeeded" : "MISSION FAILED") << "; report: " << (run.folder / "report.html").string()
+              << "\n";
+  return ok ? 0 : 1;
+}
+
+}  // namespace wasp::tools
