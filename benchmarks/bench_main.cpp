@@ -1,5 +1,6 @@
 // wasp-bench: one row a benchmark.
 #include <CLI/CLI.hpp>
+#include <string_view>
 
 #include "benchmarks/bench.h"
 
@@ -17,6 +18,10 @@ constexpr Row kRows[] = {
     {"micro", "histogram, seqlock, queue, ring and bell, one operation each (Google Benchmark)",
      wasp::bench::run_micro},
 #endif
+#ifdef WASP_HAVE_OPENCV
+    {"vision", "each vision kernel beside the library call it replaces, and beside the physical floor",
+     wasp::bench::run_vision},
+#endif
 };
 
 }  // namespace
@@ -30,6 +35,8 @@ int main(int argc, char** argv) {
     CLI::App* command = app.add_subcommand(row.name, row.help);
     command->add_flag("--json", options.json, "one JSON object a line");
     command->add_option("--seconds", options.seconds, "about how long to measure")->check(CLI::Range(1.0, 3600.0));
+    if (row.name == std::string_view("vision"))
+      command->add_option("--only", options.only, "only kernels whose name contains this");
     command->callback([&chosen, &row] { chosen = &row; });
   }
   CLI11_PARSE(app, argc, argv);

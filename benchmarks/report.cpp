@@ -29,9 +29,8 @@ void Report::note(const std::string& name, const std::string& text) {
   std::fflush(stdout);
 }
 
-void Report::print(const std::string& name, double value, const std::string& unit, std::optional<double> bar,
+void Report::print(const std::string& name, double value, const std::string& unit, std::optional<double> bar, bool ok,
                    const std::string& remark) {
-  const bool ok = !bar || value <= *bar;
   met_ = met_ && ok;
   if (json_) {
     nlohmann::json line{{"name", name}, {"value", value}, {"unit", unit}, {"bar", nullptr}, {"ok", ok}};
@@ -47,11 +46,15 @@ void Report::print(const std::string& name, double value, const std::string& uni
 }
 
 void Report::figure(const std::string& name, double value, const std::string& unit, const std::string& remark) {
-  print(name, value, unit, std::nullopt, remark);
+  print(name, value, unit, std::nullopt, true, remark);
 }
 void Report::bar(const std::string& name, double value, const std::string& unit, double bar,
                  const std::string& remark) {
-  print(name, value, unit, bar, remark);
+  print(name, value, unit, bar, value <= bar, remark);
+}
+void Report::bar_at_least(const std::string& name, double value, const std::string& unit, double bar,
+                          const std::string& remark) {
+  print(name, value, unit, bar, value >= bar, remark);
 }
 
 void Report::row(const std::string& name, const Quantiles& q) {

@@ -25,11 +25,14 @@ class Report {
   void figure(const std::string& name, double value, const std::string& unit, const std::string& remark = {});
   /// A figure that must not exceed `bar`.
   void bar(const std::string& name, double value, const std::string& unit, double bar, const std::string& remark = {});
+  /// A figure that must reach `bar`.
+  void bar_at_least(const std::string& name, double value, const std::string& unit, double bar,
+                    const std::string& remark = {});
   void row(const std::string& name, const Quantiles& q);
   [[nodiscard]] bool met() const { return met_; }
 
  private:
-  void print(const std::string& name, double value, const std::string& unit, std::optional<double> bar,
+  void print(const std::string& name, double value, const std::string& unit, std::optional<double> bar, bool ok,
              const std::string& remark);
   bool json_;
   bool met_ = true;

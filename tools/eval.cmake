@@ -2,7 +2,17 @@
 find_package(fmt REQUIRED)
 find_package(CLI11 REQUIRED)
 find_package(nlohmann_json REQUIRED)
+find_package(OpenCV REQUIRED COMPONENTS core imgproc)  # image_shift needs its warps and its peer
 
 wasp_program(wasp-eval
-  SOURCES eval_main.cpp eval_figures.cpp eval_truth.cpp eval_depth_plane.cpp eval_edge_height.cpp
+  SOURCES eval_main.cpp eval_image_shift.cpp eval_figures.cpp eval_truth.cpp eval_depth_plane.cpp eval_edge_height.cpp
+          eval_motion.cpp eval_heading_rate.cpp eval_foe.cpp eval_time_to_contact.cpp
+          eval_flow_grid.cpp eval_flow_depth.cpp
   DEPENDS wasp_vision wasp_drivers fmt::fmt CLI11::CLI11 nlohmann_json::nlohmann_json)
+
+# OpenCV is the peer of some evaluations; without it they print our figures alone.
+find_package(OpenCV QUIET COMPONENTS core imgproc imgcodecs video)
+if(OpenCV_FOUND)
+  target_link_libraries(wasp-eval PRIVATE opencv_core opencv_imgproc opencv_imgcodecs opencv_video)
+  target_compile_definitions(wasp-eval PRIVATE WASP_HAVE_OPENCV=1)
+endif()

@@ -30,6 +30,7 @@ const EvalKernel& find_kernel(const std::string& name) {
 }
 
 int run(const EvalKernel& kernel, const std::string& folder, const EvalOptions& options, bool json) {
+  if (kernel.run_folder != nullptr) return print(kernel.run_folder(folder, options), json) ? 0 : 1;
   const auto recording = wasp::drivers::Recording::open(folder);
   for (const std::string& problem : recording.problems()) fmt::print(stderr, "skipped: {}\n", problem);
   if (!json)

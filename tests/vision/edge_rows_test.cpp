@@ -1,4 +1,4 @@
-#include "vision/kernels/edge_rows.h"
+#include "vision/kernels/edge_rows_reference.h"
 
 #include <gtest/gtest.h>
 
@@ -6,6 +6,9 @@
 #include <memory>
 #include <random>
 #include <vector>
+
+#include "rt/contract.h"
+#include "tests/support/malloc_guard.h"
 
 #if __has_include(<opencv2/imgproc.hpp>)
 #define WASP_TEST_HAS_OPENCV 1
@@ -117,6 +120,64 @@ TEST(EdgeRows, MasksFarEdgesAndKeepsThoseOfUnknownDepth) {
   auto rows = std::make_unique<EdgeRows>();
   count_edge_rows({.mask_beyond_m = 3.f}, p.view(), {depth.data(), 64, 64, 64}, *rows);
   EXPECT_EQ(rows->count[31], 62 - 10);
+}
+
+void expect_same(const EdgeRowsParams& params, const GrayView& image, const DepthView& depth) {
+  auto simd = std::make_unique<EdgeRows>(), plain = std::make_unique<EdgeRows>();
+  count_edge_rows(params, image, depth, *simd);
+  count_edge_rows_reference(params, image, depth, *plain);
+  EXPECT_EQ(simd->valid, plain->valid);
+  EXPECT_EQ(simd->threshold, plain->threshold);
+  EXPECT_EQ(simd->gradient_rms, plain->gradient_rms);
+  EXPECT_EQ(simd->total, plain->total);
+  EXPECT_EQ(simd->count, plain->count);
+}
+
+/// Pixels of few levels make gradients that meet the threshold exactly; the last byte of the image ends its buffer.
+Picture tight_picture(int width_px, int height_px, unsigned levels, std::mt19937& random) {
+  Picture p{width_px, height_px, width_px, {}};
+  p.pixels.resize(static_cast<std::size_t>(width_px * height_px));
+  p.pixels.shrink_to_fit();
+  for (auto& x : p.pixels) x = static_cast<std::uint8_t>(levels < 2 ? 255 : random() % levels * (255 / (levels - 1)));
+  return p;
+}
+
+TEST(EdgeRows, SimdEqualsTheReferenceToTheLastBit) {
+  std::mt19937 random(11);
+  constexpr int kWidths[] = {3, 4, 17, 18, 33, 34, 65, 66, 67, 68, 97, 130, 131, 640, 641, 1277, kMaxEdgeColumns};
+  for (const int width_px : kWidths)
+    for (const unsigned levels : {1u, 2u, 3u, 52u, 256u}) {
+      const int height_px = 3 + static_cast<int>(random() % 9);
+      const Picture p = tight_picture(width_px, height_px, levels, random);
+      std::vector<std::uint16_t> mm(p.pixels.size());
+      for (auto& x : mm) x = static_cast<std::uint16_t>(random() % 4 == 0 ? (random() & 1) * 65535 : random() % 5000);
+      for (const EdgeKind kind : {EdgeKind::kBrighterBelow, EdgeKind::kHorizontal, EdgeKind::kAnyDirection})
+        for (const float mask_m : {0.f, 2.5f, 60.f}) {
+          SCOPED_TRACE(testing::Message() << width_px << "x" << height_px << " levels " << levels << " kind "
+                                          << static_cast<int>(kind) << " mask " << mask_m);
+          expect_same({.kind = kind, .mask_beyond_m = mask_m}, p.view(), {mm.data(), width_px, height_px, width_px});
+        }
+    }
+}
+
+TEST(EdgeRows, WidestGradientsDoNotOverflow) {
+  for (const int period : {1, 2, 3, 4}) {
+    Picture p{kMaxEdgeColumns, 40, kMaxEdgeColumns, {}};
+    for (int v = 0; v < 40; ++v) p.pixels.insert(p.pixels.end(), kMaxEdgeColumns, (v / period) % 2 != 0 ? 255 : 0);
+    for (const EdgeKind kind : {EdgeKind::kBrighterBelow, EdgeKind::kHorizontal, EdgeKind::kAnyDirection})
+      expect_same({.kind = kind}, p.view(), {});
+  }
+}
+
+TEST(EdgeRows, AllocatesNothing) {
+  const Picture p = noise(640, 480, 3);
+  auto rows = std::make_unique<EdgeRows>();
+  const test::MallocCount count;
+  {
+    rt::RealtimeSection section;
+    count_edge_rows({}, p.view(), {}, *rows);
+  }
+  EXPECT_EQ(count.violations(), 0u);
 }
 
 TEST(EdgeRows, BlankAndBadImages) {

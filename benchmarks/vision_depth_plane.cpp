@@ -1,0 +1,51 @@
+// depth_plane beside PCL's SACSegmentation, which is measured only where PCL was there when this was built.
+#include <memory>
+
+#include "benchmarks/vision_rows.h"
+#include "vision/kernels/depth_plane.h"
+#ifdef WASP_HAVE_PCL
+#include "benchmarks/pcl_plane.h"
+#endif
+
+namespace wasp::bench {
+namespace {
+
+vision::GravityPrior prior() {
+  vision::GravityPrior p;
+  p.max_angle_rad = 0.7f;
+  return p;
+}
+
+/// Cold: every call forgets the frame before, as after a cut. Warm: the state of a camera that stays on one scene.
+VisionRow plane_row(const VisionData& data, bool cold) {
+  const auto states = std::make_shared<std::vector<vision::DepthPlaneState>>(data.depth.size());
+  VisionRow row{
+      .name = cold ? "depth_plane.cold" : "depth_plane.warm",
+      .what = cold ? "floor in a depth frame never seen before" : "floor in a depth frame, the next of a flight",
+      .floor_us = 10,
+      .inputs = data.names(data.depth),
+      .ours = {},
+      .peers = {},
+      .bound = "at most 3 rounds of fixed trip counts"};
+  row.ours = [&data, states, cold](int i) {
+    const auto at = static_cast<std::size_t>(i);
+    if (cold) (*states)[at].warm = false;
+    keep(vision::estimate_floor({}, data.depth_intrinsics, data.depth[at].view(), prior(), (*states)[at]));
+  };
+  return row;
+}
+
+}  // namespace
+
+std::vector<VisionRow> depth_plane_rows(const VisionData& data) {
+  std::vector<VisionRow> rows{plane_row(data, false), plane_row(data, true)};
+#ifdef WASP_HAVE_PCL
+  for (VisionRow& row : rows)
+    row.peers = {{"pcl_sixteenth", pcl_plane(data, 4), 150}, {"pcl_full", pcl_plane(data, 1), 3000}};
+#else
+  for (VisionRow& row : rows) row.what += " (PCL was not there when this was built; no peer)";
+#endif
+  return rows;
+}
+
+}  // namespace wasp::bench

@@ -1,0 +1,41 @@
+// Image pyramid for optical flow: level 0 is the caller's image, each further level halves it through the separable
+// filter (1 3 3 1)/8, which sits between two pixels: pixel i of a level lies at 2 i + 1/2 of the level below.
+// Memory is taken once, in the constructor.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "types/image_view.h"
+
+namespace wasp::vision {
+
+class FlowPyramid {
+ public:
+  static constexpr int kMaxLevels = 5;
+  /// Smallest side of a level [px]: a block of 3 x 3 tiles, its border, and room to move.
+  static constexpr int kMinSidePx = 28;
+
+  /// Makes room for `levels` (1 ... kMaxLevels) levels, fewer where a side would fall below kMinSidePx. Allocates.
+  FlowPyramid(int width_px, int height_px, int levels);
+
+  /// Fills the levels from `image`, which must outlive their use. False (and no level) for a bad view or another size.
+  /// Realtime-safe: yes.
+  bool build(const GrayView& image) noexcept;
+
+  [[nodiscard]] int levels() const noexcept { return levels_; }
+  [[nodiscard]] const GrayView& level(int i) const noexcept { return views_[static_cast<std::size_t>(i)]; }
+
+ private:
+  int width_px_, height_px_, levels_ = 0;
+  std::array<GrayView, kMaxLevels> views_{};
+  std::array<std::vector<std::uint8_t>, kMaxLevels> pixels_;
+  std::vector<std::uint16_t> row_;
+};
+
+/// One halving step: `out` holds (width/2) x (height/2) pixels, row after row with `out_stride_px`; `row` is scratch of
+/// width + 32 elements. SIMD, the same result on every machine. Realtime-safe: yes.
+void halve_image(const GrayView& in, std::uint8_t* out, int out_stride_px, std::uint16_t* row) noexcept;
+
+}  // namespace wasp::vision

@@ -1,0 +1,75 @@
+// The inner loops of image_shift, as SIMD functions over whole arrays: Highway picks the widest instruction set the
+// processor has, once, at the first call. Each has a plain-loop twin in the tests. Realtime-safe: yes, all.
+#pragma once
+
+#include <complex>
+#include <cstddef>
+#include <cstdint>
+
+#include "types/image_view.h"
+
+namespace wasp::vision::shift {
+
+inline constexpr int kMaxSide = 2048;    ///< pixels of a window's side
+inline constexpr int kMaxBin = 4;        ///< 2 x 2 pixels a half bin x 64 still fit 16 bits
+inline constexpr int kLanesMargin = 16;  ///< floats that rows may be read past their end
+
+/// Bins of bin x bin pixels (bin a power of two up to kMaxBin) from pixel (x, y), rows x columns of them, `pitch`
+/// floats a row. Each bin weighs 1 3 3 1 (by 1 3 3 1) the half bins about it, up to a scale: plain sums would alias,
+/// and aliases move the wrong way. Half bins beyond the area repeat its edge. The pixels must lie inside the view.
+void bin_image(const GrayView& image, int x, int y, int bin, int rows, int columns, float* out, int pitch) noexcept;
+
+/// The same from binned to twice as coarse: rows and columns are the result's.
+void halve_image(const float* in, int in_pitch, int rows, int columns, float* out, int pitch) noexcept;
+
+/// sum of wy[r] wx[c] image[r][c].
+float weighted_sum(const float* image, int pitch, int rows, int columns, const float* wx, const float* wy) noexcept;
+
+/// z[r][c] = wy[r] wx[c] ((a - mean_a) + j (b - mean_b)) in the top left rows x columns of z (z_rows x z_columns), 0
+/// elsewhere.
+void pack_pair(const float* a, const float* b, int pitch, int rows, int columns, float mean_a, float mean_b,
+               const float* wx, const float* wy, std::complex<float>* z, int z_rows, int z_columns) noexcept;
+
+/// Rows -rows_v ... rows_v by columns 0 ... columns_u of a half spectrum, as separate planes, `pitch` floats a row.
+struct Band {
+  float *re = nullptr, *im = nullptr;
+  int rows_v = 0, columns_u = 0, pitch = 0;
+  [[nodiscard]] std::ptrdiff_t offset(int v) const noexcept { return static_cast<std::ptrdiff_t>(v + rows_v) * pitch; }
+  [[nodiscard]] int rows() const noexcept { return 2 * rows_v + 1; }
+};
+
+/// Energies of the two spectra inside a band (times 4).
+struct BandEnergy {
+  double first = 0, second = 0;
+};
+
+/// H = F2 conj(F1) (3.13) (times 4) from the transform of f1 + j f2, inside the band. Needs rows_v < z_rows / 2 and
+/// columns_u < z_columns / 2, columns_u + 16 < z_columns; the band's rows must be padded to kLanesMargin.
+BandEnergy cross_power(const std::complex<float>* z, int z_rows, int z_columns, const Band& band) noexcept;
+
+/// Mean of |H| over the band's columns u >= u_from (all rows).
+float mean_magnitude(const Band& band, int u_from) noexcept;
+
+/// G = H |H| wx[u] wy[v] / (|H|^2 + noise^2), same shapes; wy starts at row -rows_v; noise 0 is phase only.
+/// Returns the sum of |G|.
+float whiten(const Band& h, float noise, const float* wx, const float* wy, const Band& g) noexcept;
+
+/// Correlation and its derivatives at one shift: sums over the band of t = G ex[u] ey[v].
+struct PeakSums {
+  float c = 0, cx = 0, cy = 0, cxx = 0, cxy = 0, cyy = 0;
+};
+
+/// ex, ey: unit phasors as (cos, sin) arrays; ey starts at row -rows_v. Derivatives are by the phase step per bin.
+PeakSums peak_sums(const Band& band, const float* ex_re, const float* ex_im, const float* ey_re,
+                   const float* ey_im) noexcept;
+
+/// Largest value of a row and its column.
+float max_of(const float* values, int count) noexcept;
+
+/// Sums over the overlap of two images for the normalised coefficient (3.15).
+struct OverlapSums {
+  float a = 0, b = 0, aa = 0, bb = 0, ab = 0;
+};
+OverlapSums overlap_sums(const float* a, const float* b, int pitch, int rows, int columns) noexcept;
+
+}  // namespace wasp::vision::shift
