@@ -188,35 +188,59 @@ std::optional<Listing> list_hover_clips(const fs::path& folder, const Names&) {
   return all;
 }
 
-/// The fallback: PNGs whose names end in a number; 16-bit grey counts as depth.
+/// Size and centre of the first usable image; a damaged one is a problem, told when the frame is added.
+void assume_centred(const fs::path& file, Listing& listing) {
+  const ImageInfo info = probe_image(file);
+  listing.intrinsics.width_px = info.width_px;
+  listing.intrinsics.height_px = info.height_px;
+  listing.intrinsics.cx_px = 0.5f * static_cast<float>(info.width_px - 1);
+  listing.intrinsics.cy_px = 0.5f * static_cast<float>(info.height_px - 1);
+}
+
+/// EuRoC ASL: grey PNGs named by their time in nanoseconds.
+std::optional<Listing> list_asl(const fs::path& folder, const Names& names) {
+  constexpr std::size_t kDigits = 16;  // a time in nanoseconds since 1970 has 19
+  Listing listing{.layout = "asl"};
+  listing.nominal_rate_hz = 20.0;
+  for (const std::string& name : names) {
+    const std::size_t digits = name.find_first_not_of("0123456789");
+    if (digits == std::string::npos || digits < kDigits || digits > 19 || name.substr(digits) != ".png") continue;
+    const auto index = static_cast<std::uint32_t>(listing.frames.size());
+    listing.frames.push_back({std::stoll(name), index, {}, folder / name, name});
+  }
+  if (listing.frames.empty()) return std::nullopt;
+  assume_centred(listing.frames.front().gray_file, listing);
+  return listing;
+}
+
+/// The fallback: PNGs whose names end in a number, of the stem that most of them share; 16-bit grey counts as depth.
 std::optional<Listing> list_numbered_png(const fs::path& folder, const Names& names) {
-  std::map<std::uint32_t, std::string> files;
+  std::map<std::string, std::map<std::uint32_t, std::string>> by_stem;
   for (const std::string& name : names)
-    if (const auto number = trailing_number(name); number && name.ends_with(".png")) files.emplace(*number, name);
+    if (const auto number = trailing_number(name); number && name.ends_with(".png"))
+      by_stem[name.substr(0, name.find_last_not_of("0123456789", name.find('.') - 1) + 1)].emplace(*number, name);
+  if (by_stem.empty()) return std::nullopt;
+  const auto& files = std::max_element(by_stem.begin(), by_stem.end(), [](const auto& a, const auto& b) {
+                        return a.second.size() < b.second.size();
+                      })->second;
   Listing listing{.layout = "numbered_png"};
   for (const auto& [number, name] : files) {
     const TimeNs time_ns = at_rate(number - files.begin()->first, listing.nominal_rate_hz);
     try {
       const ImageInfo info = probe_image(folder / name);
       const bool depth = info.bits == 16 && !info.colour;
-      if (listing.frames.empty()) {
-        listing.intrinsics.width_px = info.width_px;
-        listing.intrinsics.height_px = info.height_px;
-        listing.intrinsics.cx_px = 0.5f * static_cast<float>(info.width_px - 1);
-        listing.intrinsics.cy_px = 0.5f * static_cast<float>(info.height_px - 1);
-      }
+      if (listing.frames.empty()) assume_centred(folder / name, listing);
       listing.frames.push_back(
           {time_ns, number, depth ? folder / name : fs::path{}, depth ? fs::path{} : folder / name, name});
     } catch (const std::runtime_error& error) {
       listing.problems.emplace_back(error.what());
     }
   }
-  if (files.empty()) return std::nullopt;
   return listing;
 }
 
-constexpr std::array kLayouts = {&list_tum,         &list_7scenes, &list_tum_pair,    &list_pgm,
-                                 &list_named_depth, &list_hover,   &list_hover_clips, &list_numbered_png};
+constexpr std::array kLayouts = {&list_tum,   &list_7scenes,     &list_tum_pair, &list_pgm,         &list_named_depth,
+                                 &list_hover, &list_hover_clips, &list_asl,      &list_numbered_png};
 
 /// A folder of clips is not a recording; say which of its sub-folders are.
 [[noreturn]] void refuse(const fs::path& folder) {

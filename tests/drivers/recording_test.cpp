@@ -165,14 +165,14 @@ TEST_P(RealRecording, OpensAndLoadsEveryEntry) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Layouts, RealRecording,
-                         testing::Values(Expected{"kinect_7scenes_redkitchen", "7scenes", 40},
-                                         Expected{"kinect_floor_pcl", "named_depth", 4},
-                                         Expected{"kinect_livingroom_pgm", "depth_pgm", 2},
-                                         Expected{"kinect_table_osd", "named_depth", 2},
-                                         Expected{"rgbd_tum_pair", "tum_pair", 2},
-                                         Expected{"hover_mocap/climb", "hover_mocap", 40},
-                                         Expected{"hover_mocap/lateral_yaw", "hover_mocap", 40}));
+INSTANTIATE_TEST_SUITE_P(
+    Layouts, RealRecording,
+    testing::Values(Expected{"kinect_7scenes_redkitchen", "7scenes", 40},
+                    Expected{"kinect_floor_pcl", "named_depth", 4}, Expected{"kinect_livingroom_pgm", "depth_pgm", 2},
+                    Expected{"kinect_table_osd", "named_depth", 2}, Expected{"rgbd_tum_pair", "tum_pair", 2},
+                    Expected{"hover_mocap/climb", "hover_mocap", 40},
+                    Expected{"hover_mocap/lateral_yaw", "hover_mocap", 40},
+                    Expected{"euroc_v101/cam0_static", "asl", 12}, Expected{"flow_yosemite", "numbered_png", 15}));
 
 TEST(RealRecordings, AFolderOfClipsPlaysOneAfterTheOther) {
   const fs::path folder = WASP_SOURCE_DIR "/../shared/data/hover_mocap";

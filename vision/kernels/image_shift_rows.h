@@ -1,5 +1,5 @@
 // The inner loops of image_shift, as SIMD functions over whole arrays: Highway picks the widest instruction set the
-// processor has, once, at the first call. Each has a plain-loop twin in the tests. Realtime-safe: yes, all.
+// processor has, once, at the first call. Realtime-safe: yes, all.
 #pragma once
 
 #include <complex>
