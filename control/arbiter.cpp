@@ -6,6 +6,8 @@
 namespace wasp::control {
 namespace {
 
+constexpr DurationNs kClockSlack = 50 * kMillisecond;  // a cue from further ahead carries a wrong clock, and never ages
+
 void note_evidence(Intention& intention, const Cue& cue) noexcept {
   if (intention.oldest_exposed_at_ns == kNever || cue.exposed_at_ns < intention.oldest_exposed_at_ns)
     intention.oldest_exposed_at_ns = cue.exposed_at_ns;
@@ -18,7 +20,7 @@ bool usable(const Cue& cue, const ArbiterRow& row, TimeNs now_ns) noexcept {
   const bool finite = std::isfinite(b.height_m) && std::isfinite(b.height_sigma_m) &&
                       std::isfinite(b.heading_rate_radps) && std::isfinite(b.pitch_rad);
   return finite && b.validity == Validity::kValid && cue.over_budget == 0 &&
-         now_ns - cue.exposed_at_ns <= row.age_limit_ns;
+         cue.exposed_at_ns <= now_ns + kClockSlack && now_ns - cue.exposed_at_ns <= row.age_limit_ns;
 }
 
 Intention arbitrate(const ArbiterParams& params, const CueSet& set, TimeNs now_ns) noexcept {

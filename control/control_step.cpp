@@ -88,7 +88,7 @@ ControlOutput control_step(const ControlParams& p, const ControlInput& in, Contr
   const MissionWish wish =
       mission_step(p.mission,
                    {in.now_ns, in.autopilot.armed, in.autopilot.follows, intention.height_source >= 0,
-                    s.height.height_m, s.height.climb_rate_mps, in.stop_requested},
+                    s.height.height_m, s.height.climb_rate_mps, in.stop_requested, in.autopilot.heard_at_ns != kNever},
                    s.mission);
   const Setpoint wanted = wanted_setpoint(p, in, intention, wish, s);
   Setpoint probe = s.sent;
@@ -114,7 +114,9 @@ ControlOutput control_step(const ControlParams& p, const ControlInput& in, Contr
   c.mode = s.mode.mode;
   c.reason = s.mode.reason;
   c.mission_phase = static_cast<std::uint8_t>(s.mission.phase);
-  c.sent = !(s.mode.mode == FlightMode::kFailsafe && p.failsafe_action == FailsafeAction::kStopStream);
+  const bool not_ours = in.autopilot.heard_at_ns == kNever || s.mission.phase == MissionPhase::kBroken;
+  const bool stopped = s.mode.mode == FlightMode::kFailsafe && p.failsafe_action == FailsafeAction::kStopStream;
+  c.sent = !not_ours && !stopped;
   out.ask_arm = wish.armed && !(in.autopilot.armed && in.autopilot.follows) && s.mission.phase == MissionPhase::kArm;
   out.ask_disarm = wish.disarm && in.autopilot.armed;
   return out;

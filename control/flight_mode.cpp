@@ -31,9 +31,9 @@ constexpr std::array kRows = {
 bool flight_mode_step(const Situation& situation, ModeState& state) noexcept {
   for (const Row& row : kRows) {
     if (!row.applies(situation)) continue;
-    if (row.mode == state.mode) return false;
+    const bool moved = row.mode != state.mode;
     state = {row.mode, row.reason};
-    return true;
+    return moved;
   }
   return false;
 }

@@ -5,6 +5,7 @@ namespace {
 
 constexpr float kLandedMargin_m = 0.06f;  // this close to the standing height counts as standing
 constexpr DurationNs kLandedFor = 700 * kMillisecond;
+constexpr double kLongestLanding_s = 60.0, kLongestDisarm_s = 10.0;
 constexpr float kBelowGround_m = 0.25f;  // landing target: firmly onto the floor
 
 void enter(MissionState& s, MissionPhase phase, TimeNs now_ns) noexcept {
@@ -26,8 +27,10 @@ bool standing_long_enough(const MissionInput& in, MissionState& s) noexcept {
 
 MissionWish wait_and_arm(const MissionParams& p, const MissionInput& in, MissionState& s, double in_phase_s) noexcept {
   MissionWish wish;
-  const bool ready = in.ground_seen || p.follow_recording;
-  if (in.stop_requested) {
+  const bool ready = in.heard && (in.ground_seen || p.follow_recording);
+  if (s.phase == MissionPhase::kWait && in.heard && in.armed) {
+    enter(s, MissionPhase::kBroken, in.now_ns);  // armed by somebody else, perhaps in the air: not ours to take over
+  } else if (in.stop_requested) {
     enter(s, in.armed ? MissionPhase::kDisarm : MissionPhase::kDone, in.now_ns);
   } else if (in_phase_s > static_cast<double>(p.patience_s)) {
     enter(s, MissionPhase::kBroken, in.now_ns);
@@ -80,10 +83,15 @@ MissionWish mission_step(const MissionParams& p, const MissionInput& in, Mission
         enter(s, MissionPhase::kDone, in.now_ns);
       else if (standing_long_enough(in, s))
         enter(s, MissionPhase::kDisarm, in.now_ns);
+      else if (in_phase_s > kLongestLanding_s)
+        enter(s, MissionPhase::kBroken, in.now_ns);
       return wish;
     case MissionPhase::kDisarm:
       wish.disarm = true;
-      if (!in.armed) enter(s, MissionPhase::kDone, in.now_ns);
+      if (!in.armed)
+        enter(s, MissionPhase::kDone, in.now_ns);
+      else if (in_phase_s > kLongestDisarm_s)
+        enter(s, MissionPhase::kBroken, in.now_ns);
       return wish;
     case MissionPhase::kDone:
     case MissionPhase::kBroken:

@@ -37,6 +37,7 @@ struct MissionInput {
   bool armed = false, follows = false, ground_seen = false;
   float height_m = 0, climb_rate_mps = 0;
   bool stop_requested = false;
+  bool heard = true;  ///< the autopilot has said whether it is armed
 };
 
 struct MissionState {

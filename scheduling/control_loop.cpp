@@ -44,6 +44,7 @@ void ControlLoop::tick(const rt::Release& release, LoopControl& control) WASP_RE
   input.now_ns = release.released_at_ns;
   input.dt_s = static_cast<float>(to_seconds(config_.control_period_ns * static_cast<DurationNs>(1 + release.skipped)));
   input.stop_requested = control.stop_requested.load(std::memory_order_relaxed);
+  consecutive_misses_ += static_cast<int>(release.skipped);
   input.deadlines_missed = consecutive_misses_ >= kMissesBeforeHold;
   gather(input);
   const control::ControlOutput output = control::control_step(config_.control, input, state_);
@@ -136,8 +137,8 @@ void ControlLoop::account(const control::ControlInput& input, Command& command, 
     const Cue& cue = input.cues.cues[i];
     if (!input.cues.present[i]) continue;
     behaviour_stages_[i].age->record(input.now_ns - cue.exposed_at_ns);
-    if (written && cue.exposed_at_ns != last_exposed_[i])
-      behaviour_stages_[i].end_to_end->record(command.written_at_ns - cue.exposed_at_ns);
+    if (!written || cue.exposed_at_ns == last_exposed_[i]) continue;
+    behaviour_stages_[i].end_to_end->record(command.written_at_ns - cue.exposed_at_ns);
     last_exposed_[i] = cue.exposed_at_ns;
   }
 }

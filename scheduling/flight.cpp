@@ -3,6 +3,7 @@
 #include <signal.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <memory>
 
@@ -83,6 +84,10 @@ class Flight {
     control_.strict_syscalls = config_.strict_syscalls;
   }
 
+  ~Flight() { control_.stop = true; }  // threads that stand already end before they are joined
+  Flight(const Flight&) = delete;
+  Flight& operator=(const Flight&) = delete;
+
   int run(const sigset_t& signals) {
     open_camera();
     wire();
@@ -98,11 +103,14 @@ class Flight {
  private:
   void open_camera() {
     if (options_.replay.empty()) {
+      if (config_.camera_driver == "replay")
+        throw std::runtime_error("[camera] driver = \"replay\" needs --replay DIR");
       camera_ = std::make_unique<shm::Region>(attach_camera(options_.instance, 30.0, [] { return false; }));
       return;
     }
     auto recording = drivers::Recording::open(options_.replay);
     for (const auto& problem : recording.problems()) log("recording: " + problem);
+    recording_problems_ = recording.problems().size();
     config_.camera = recording.geometry();
     scripts_ = load_replay_script(options_.replay);
     second_lap_ = ReplayCamera::lap_sequence(recording);
@@ -149,6 +157,13 @@ class Flight {
         config_, ControlWiring{&flight_, &stages_, &report_, &port_, &autopilot_, &control_events_});
   }
 
+  [[nodiscard]] int highest_priority() const {
+    int highest =
+        std::max({config_.control_thread.priority, config_.link_thread.priority, config_.camera_thread.priority});
+    for (const auto& b : config_.behaviours) highest = std::max(highest, b.priority);
+    return highest;
+  }
+
   /// Locks memory and keeps the processor awake; refuses by name where a right is missing.
   void prepare_real_time() {
     if (!real_time_ && config_.enforce_real_time)
@@ -156,7 +171,7 @@ class Flight {
           "refusing to arm: --no-rt was given, but the configuration says [run] enforce_real_time = true");
     if (!real_time_) return;
     std::string refusal;
-    for (const auto& m : rt::missing_rights(config_.control_thread.priority))
+    for (const auto& m : rt::missing_rights(highest_priority()))
       refusal += "\n  missing right: " + m.right + "; grant it with: " + m.remedy;
     if (!refusal.empty()) throw std::runtime_error("refusing to arm without real time (or say --no-rt):" + refusal);
     latency_hold_ = std::make_unique<rt::CpuLatencyHold>();
@@ -218,7 +233,9 @@ class Flight {
     const bool flown = status.mission_result.load() == 1;
     log(flown ? "mission flown to its end" : "mission broken off");
     status.finished = 1;
-    return flown ? 0 : 1;
+    const bool damaged = replay_ && (replay_->decode_errors() > 0 || recording_problems_ > 0);
+    if (damaged) log("the recording is damaged: see above");
+    return flown && !damaged ? 0 : 1;
   }
 
   const BehaviourTable& table_;
@@ -233,6 +250,7 @@ class Flight {
   std::unique_ptr<shm::Region> camera_;
   std::map<std::string, BehaviourScript> scripts_;
   std::uint32_t second_lap_ = 0;
+  std::size_t recording_problems_ = 0;
   std::unique_ptr<ReplayCamera> replay_;
   std::unique_ptr<rt::CpuLatencyHold> latency_hold_;
   rt::Seqlock<LinkReport> report_;

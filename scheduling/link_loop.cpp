@@ -39,9 +39,9 @@ void LinkLoop::serve(LoopControl& control) WASP_REALTIME {
     }
     if (got.bytes == 0) break;
     received_at_ns_ = rt::now();
-    const auto good_before = autopilot_.wire_counts().good;
+    heard_ = false;
     autopilot_.receive(std::span<const std::uint8_t>(buffer_.data(), got.bytes), received_at_ns_, *this);
-    if (autopilot_.wire_counts().good != good_before) {
+    if (heartbeat_seen_ && heard_) {  // before the first heartbeat `armed` would be a guess
       now_.heard_at_ns = received_at_ns_;
       report_.store(now_);
     }
@@ -66,13 +66,18 @@ void LinkLoop::reopen(LoopControl& control) WASP_REALTIME {
 }
 
 void LinkLoop::on_imu(const ImuSample& sample) WASP_REALTIME {
+  heard_ = true;
   imu_.write(sample, received_at_ns_);
   age_->record(received_at_ns_ - sample.exposed_at_ns);
 }
 
-void LinkLoop::on_attitude(const AttitudeSample& sample) WASP_REALTIME { attitude_.write(sample, received_at_ns_); }
+void LinkLoop::on_attitude(const AttitudeSample& sample) WASP_REALTIME {
+  heard_ = true;
+  attitude_.write(sample, received_at_ns_);
+}
 
 void LinkLoop::on_heartbeat(const drivers::AutopilotStatus& status) WASP_REALTIME {
+  heartbeat_seen_ = heard_ = true;
   now_.armed = status.armed ? 1 : 0;
   now_.custom_mode = status.custom_mode;
 }

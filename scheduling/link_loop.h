@@ -42,6 +42,8 @@ class LinkLoop {
   LinkReport now_;
   TimeNs received_at_ns_ = 0, timesync_due_ns_ = 0;
   bool gone_ = false;
+  bool heard_ = false;  ///< the autopilot itself spoke in the bytes at hand
+  bool heartbeat_seen_ = false;
   std::array<std::uint8_t, 4096> buffer_{};
 };
 

@@ -46,10 +46,10 @@ int watch(const Run& run, ChildProcess& flight, ChildProcess& sim) {
   double printed_s = -10;
   while (!flight.poll()) {
     if (interrupts > passed_on) {
-      passed_on = interrupts;
+      ++passed_on;  // one step a look: the first is always "land"
       std::cerr << (passed_on == 1 ? "\ninterrupted: landing in order (once more: stop at once)\n"
                                    : "\nstopping at once\n");
-      flight.signal(passed_on == 1 ? SIGINT : SIGKILL);
+      flight.signal(passed_on <= 2 ? SIGINT : SIGKILL);  // the second stops it by its own way
     }
     if (const auto code = sim.poll()) {
       std::cerr << fmt::format("\nthe simulator ended with code {}\n", *code);
@@ -106,6 +106,7 @@ int main(int argc, char** argv) {
   action.sa_handler = wasp::tools::on_interrupt;
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
+  sigaction(SIGHUP, &action, nullptr);
   try {
     return wasp::tools::fly(std::move(options));
   } catch (const std::exception& e) {

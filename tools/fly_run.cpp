@@ -71,7 +71,7 @@ void write_override(Run& run) {
 std::string example_recording(const FlyOptions& o) {
   const fs::path folder = o.out / "example";
   if (!fs::exists(folder / "recording/depth.txt")) {
-    std::cout << "making the example recording with the simulator: " << folder.string() << "\n" << std::flush;
+    std::cerr << "making the example recording with the simulator: " << folder.string() << "\n" << std::flush;
     ChildProcess fly(
         {program("wasp"), "fly", "--name", "example", "--out", o.out.string(), "--seconds", "6", "--record"},
         (o.out / "example.txt").string());
@@ -86,9 +86,9 @@ void plan_replay(Run& run) {
   const auto recording = drivers::Recording::open(run.options.replay);
   run.flight_seconds =
       run.options.seconds > 0 ? run.options.seconds : to_seconds(scheduling::ReplayCamera::lap_ns(recording));
-  std::cout << fmt::format("replaying {} ({} frames, {:.1f} s, {} layout) for {:.1f} s\n", run.options.replay,
-                           recording.entries().size(), to_seconds(scheduling::ReplayCamera::lap_ns(recording)),
-                           recording.layout(), run.flight_seconds);
+  (run.options.json ? std::cerr : std::cout) << fmt::format(
+      "replaying {} ({} frames, {:.1f} s, {} layout) for {:.1f} s\n", run.options.replay, recording.entries().size(),
+      to_seconds(scheduling::ReplayCamera::lap_ns(recording)), recording.layout(), run.flight_seconds);
 }
 
 void write_camera_toml(const Run& run) {

@@ -74,7 +74,9 @@ int conclude(Run& run, int flight_code, bool interrupted) {
       summary = run_from_json(doc);
     }
   }
-  run.exit_reason = interrupted     ? "interrupted by the user, landed in order"
+  run.exit_reason = interrupted && flight_code == 0 ? "interrupted by the user, landed in order"
+                    : interrupted
+                        ? fmt::format("interrupted by the user; flight process ended with code {}", flight_code)
                     : flight_code == 0 ? "mission ended in order"
                                        : fmt::format("flight process ended with code {}", flight_code);
   const auto phases = read_phases(run.folder / "log");

@@ -46,6 +46,11 @@ TEST_F(ArbiterTest, AnOldCueIsAbsent) {
   EXPECT_EQ(arbitrate(params, set, params.rows[0].age_limit_ns + 1).height_source, -1);
 }
 
+TEST_F(ArbiterTest, ACueFromTheFutureIsAbsent) {
+  give(0, height_cue(10 * kSecond, 1.f));
+  EXPECT_EQ(arbitrate(params, set, 1).height_source, -1);
+}
+
 TEST_F(ArbiterTest, ACueMadeOverBudgetIsAbsent) {
   give(0, height_cue(0, 1.f));
   set.cues[0].over_budget = 1;

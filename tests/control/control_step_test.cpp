@@ -39,8 +39,33 @@ ControlInput good_input(TimeNs now_ns) {
   return in;
 }
 
-TEST(ControlStep, FliesWhenEverythingIsThere) {
+/// The state after a tick on the ground, disarmed, as every flight begins.
+ControlState on_the_ground(const ControlParams& p) {
   ControlState state;
+  ControlInput in = good_input(10 * kMillisecond);
+  in.autopilot.armed = in.autopilot.follows = false;
+  control_step(p, in, state);
+  return state;
+}
+
+TEST(ControlStep, AVehicleFoundArmedIsNotAdopted) {
+  ControlState state;
+  for (int i = 1; i < 20; ++i) {
+    const ControlOutput out = control_step(params(), good_input(i * 50 * kMillisecond), state);
+    EXPECT_EQ(out.command.sent, 0);  // it may be in the air: no command of ours, not even a neutral one
+    EXPECT_FALSE(out.ask_arm || out.ask_disarm);
+  }
+}
+
+TEST(ControlStep, NothingIsSentBeforeTheAutopilotWasHeard) {
+  ControlState state;
+  ControlInput in = good_input(50 * kMillisecond);
+  in.autopilot = {};
+  EXPECT_EQ(control_step(params(), in, state).command.sent, 0);
+}
+
+TEST(ControlStep, FliesWhenEverythingIsThere) {
+  ControlState state = on_the_ground(params());
   ControlOutput out;
   for (int i = 1; i < 100; ++i) out = control_step(params(), good_input(i * 50 * kMillisecond), state);
   EXPECT_EQ(out.command.mode, FlightMode::kBehaviour);
@@ -51,8 +76,8 @@ TEST(ControlStep, FliesWhenEverythingIsThere) {
 
 TEST(ControlStep, HoldsThenFailsafeWhenTheGroundIsLost) {
   const ControlParams p = params();
-  ControlState state;
-  TimeNs t = 0;
+  ControlState state = on_the_ground(p);
+  TimeNs t = 10 * kMillisecond;
   for (int i = 0; i < 60; ++i) control_step(p, good_input(t += 50 * kMillisecond), state);
   ControlOutput out;
   const TimeNs lost_at = t;
@@ -90,7 +115,7 @@ float any_float(std::mt19937& random) {
 TEST(ControlStep, PropertyNothingWildEverLeaves) {
   std::mt19937 random(2026);
   ControlParams p = params();
-  ControlState state;
+  ControlState state = on_the_ground(p);
   TimeNs t = 0;
   for (int i = 0; i < 50'000; ++i) {
     ControlInput in = good_input(t += 50 * kMillisecond);
@@ -110,7 +135,7 @@ TEST(ControlStep, PropertyNothingWildEverLeaves) {
     if (chance(7)) in.attitude_present = false;
     if (chance(9)) in.autopilot.follows = false;
     if (chance(50)) in.autopilot.armed = false;
-    if (chance(300)) state = ControlState{};
+    if (chance(300)) state = on_the_ground(p);
     const Command c = control_step(p, in, state).command;
     ASSERT_TRUE(std::isfinite(c.thrust) && c.thrust >= 0 && c.thrust <= 1) << i;
     ASSERT_TRUE(std::isfinite(c.yaw_rate_radps) && std::fabs(c.yaw_rate_radps) <= p.limits.max_yaw_rate_radps) << i;

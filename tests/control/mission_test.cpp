@@ -74,6 +74,16 @@ TEST(Mission, DisarmedInFlightItNeverArmsAgain) {
   EXPECT_EQ(v.state.phase, MissionPhase::kBroken);
 }
 
+TEST(Mission, ALandingThatNeverEndsIsBrokenOff) {
+  Obedient v = standing();
+  v.run(60);
+  v.input.stop_requested = true;
+  v.run(1);
+  v.input.ground_seen = false;
+  v.run(61 * 20);
+  EXPECT_EQ(v.state.phase, MissionPhase::kBroken);
+}
+
 TEST(Mission, GivesUpWhenTheGroundIsNeverSeen) {
   Obedient v;
   v.run(static_cast<int>(v.params.patience_s * 20) + 10);
