@@ -32,7 +32,6 @@ struct ControlWiring {
   drivers::SerialPort* port = nullptr;
   drivers::AutopilotLink* autopilot = nullptr;
   EventQueue* events = nullptr;
-  bool link_attitude_is_vehicle = true;
 };
 
 class ControlLoop {
