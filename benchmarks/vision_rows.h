@@ -14,16 +14,13 @@ std::vector<VisionRow> depth_plane_rows(const VisionData& data);
 std::vector<VisionRow> cluster_rows(const VisionData& data);
 std::vector<VisionRow> image_shift_rows(const VisionData& data);
 std::vector<VisionRow> log_polar_rows(const VisionData& data);
+std::vector<VisionRow> motion_rows(const VisionData& data);
+std::vector<VisionRow> frame_rows(const VisionData& data);
 
 using VisionRowMaker = std::vector<VisionRow> (*)(const VisionData&);
 inline constexpr VisionRowMaker kVisionRowMakers[] = {
-    &log_polar_rows,
-    &edge_rows_rows,
-    &flow_grid_rows,
-    &image_shift_rows,
-    &depth_median_rows,
-    &depth_plane_rows,
-    &cluster_rows,
+    &log_polar_rows,   &edge_rows_rows, &flow_grid_rows, &image_shift_rows, &depth_median_rows,
+    &depth_plane_rows, &cluster_rows,   &motion_rows,    &frame_rows,
 };
 
 }  // namespace wasp::bench

@@ -11,6 +11,7 @@
 #include "drivers/image_file.h"
 #include "tools/eval_kernels.h"
 #include "tools/eval_motion.h"
+#include "vision/kernels/derotate.h"
 #include "vision/kernels/foe.h"
 
 namespace wasp::tools {
@@ -143,7 +144,11 @@ struct Ways {
 
 void try_pair(Ways& ways, const Intrinsics& k, const MotionTruth& truth, const vision::FlowField& flow) {
   vision::FlowField derotated = flow;
-  vision::remove_rotation(k, truth.rotation_rad, derotated);
+  const float angle = truth.rotation_rad.norm();
+  if (angle > 0.f) {
+    const Mat3 R_first_second = Eigen::AngleAxisf(angle, truth.rotation_rad / angle).toRotationMatrix();
+    vision::derotate({.intrinsics = k}, flow, R_first_second.transpose(), derotated);
+  }
   const auto begin = std::chrono::steady_clock::now();
   const vision::Foe foe = vision::find_foe({}, derotated);
   ways.times_us.push_back(std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - begin).count());

@@ -1,14 +1,14 @@
-// Successive frames of a downward camera (gaps of 1 and 2) through flow grid and similarity fit. Truth from
-// gt_per_frame.csv: image rotation = wz dt, so yaw (NED) = -wz dt; height ratio = exp(vz/h dt); rates by the trapezoid
-// rule over the frames of the gap on the nominal frame grid (the table's own times jitter). Without a table the camera
-// counts as still, and the truth is zero.
+// Successive frames of a downward camera (gaps of 1 and 2) through flow grid and similarity fit, and, beside it,
+// through the thesis' log-polar maps. Truth from gt_per_frame.csv: image rotation = wz dt, so yaw (NED) = -wz dt;
+// height ratio = exp(vz/h dt); rates by the trapezoid rule over the frames of the gap on the nominal frame grid (the
+// table's own times jitter). Without a table the camera counts as still, and the truth is zero.
 #include <chrono>
 #include <cmath>
 #include <numbers>
 
 #include "tools/eval_kernels.h"
 #include "tools/eval_motion.h"
-#include "vision/kernels/heading_rate.h"
+#include "vision/kernels/heading_log_polar.h"
 
 namespace wasp::tools {
 namespace {
@@ -39,17 +39,15 @@ struct Tally {
   double pairs = 0, valid = 0;
 };
 
-Tally run(const std::vector<MotionFrame>& frames, const NumberTable& table, double rate_hz, std::size_t gap) {
+/// `estimate(first, second)` gives the motion between two frames.
+template <class Estimate>
+Tally run(const std::vector<MotionFrame>& frames, const NumberTable& table, double rate_hz, std::size_t gap,
+          const Estimate& estimate) {
   Tally tally;
-  const int width = frames[0].width_px, height = frames[0].height_px;
-  WindowFlow flow(width, height);
-  const vision::SimilarityFitParams params{.centre_x_px = 0.5f * static_cast<float>(width - 1),
-                                           .centre_y_px = 0.5f * static_cast<float>(height - 1)};
   for (std::size_t i = 0; i + gap < frames.size(); ++i) {
     const MotionFrame &first = frames[i], &second = frames[i + gap];
     const auto begin = std::chrono::steady_clock::now();
-    const vision::FlowField& field = flow.track(first, second, {0, 0, width, height});
-    const auto rate = vision::heading_from_fit(vision::fit_similarity(params, field));
+    const vision::HeadingRate rate = estimate(first, second);
     tally.times_us.push_back(
         std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - begin).count());
     const Truth truth =
@@ -80,9 +78,24 @@ std::vector<Figure> eval_heading_rate(const drivers::Recording& recording, const
   const auto frames = read_sequence(recording.folder());
   const NumberTable table = read_numbers(recording.folder() / "gt_per_frame.csv");
   std::vector<Figure> figures{{"frames", static_cast<double>(frames.size()), ""}};
-  const Tally one = run(frames, table, recording.nominal_rate_hz(), 1);
+  const int width = frames[0].width_px, height = frames[0].height_px;
+  WindowFlow flow(width, height);
+  const vision::SimilarityFitParams params{.centre_x_px = 0.5f * static_cast<float>(width - 1),
+                                           .centre_y_px = 0.5f * static_cast<float>(height - 1)};
+  const auto by_fit = [&](const MotionFrame& first, const MotionFrame& second) {
+    return vision::heading_from_fit(vision::fit_similarity(params, flow.track(first, second, {0, 0, width, height})));
+  };
+  vision::HeadingLogPolar maps(width, height, width);
+  const auto by_maps = [&](const MotionFrame& first, const MotionFrame& second) {
+    maps.reset();
+    (void)maps.step(first.view());
+    return maps.step(second.view());
+  };
+  const double rate_hz = recording.nominal_rate_hz();
+  const Tally one = run(frames, table, rate_hz, 1, by_fit);
   add_medians(figures, one, "", true);
-  if (frames.size() > 2) add_medians(figures, run(frames, table, recording.nominal_rate_hz(), 2), "_gap2", false);
+  if (frames.size() > 2) add_medians(figures, run(frames, table, rate_hz, 2, by_fit), "_gap2", false);
+  add_medians(figures, run(frames, table, rate_hz, 1, by_maps), "_log_polar", false);
   add_times(figures, one.times_us);
   return figures;
 }

@@ -6,6 +6,9 @@
 #include <limits>
 #include <random>
 
+#include "rt/contract.h"
+#include "tests/support/malloc_guard.h"
+
 namespace wasp::vision {
 namespace {
 
@@ -72,6 +75,18 @@ TEST(AvoidDecision, BadInputIsNotTaken) {
   EXPECT_FALSE(monitor.add(5, 15.f).ready);
   AvoidMonitor huge({.pairs = 1000});
   for (int frame = 0; frame < 100; ++frame) huge.add(frame, 50.f);
+}
+
+TEST(AvoidDecision, DoesNotAllocate) {
+  AvoidMonitor monitor;
+  bool avoided = false;
+  const wasp::test::MallocCount count;
+  {
+    const rt::RealtimeSection section;
+    for (int frame = 0; frame < 50; ++frame) avoided = monitor.add(frame, 60.f - static_cast<float>(frame)).avoid;
+  }
+  EXPECT_TRUE(avoided);
+  EXPECT_EQ(count.violations(), 0u);
 }
 
 }  // namespace

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "rt/contract.h"
+#include "tests/support/malloc_guard.h"
 #include "tests/vision/synthetic_flow.h"
 
 namespace wasp::vision {
@@ -41,6 +43,16 @@ TEST(HeadingRate, InvalidStaysInvalid) {
   EXPECT_EQ(climb_rate_mps(heading_from_fit(fit), 2.f, 0.f), 0.f);
   fit.rotation_sigma_rad = 0.5f;
   EXPECT_FALSE(heading_from_fit(fit).valid);
+}
+
+TEST(HeadingRate, DoesNotAllocate) {
+  const auto flow = flow_over_floor(0.02f, 1.01f, 0.f, 0.f);
+  const wasp::test::MallocCount count;
+  {
+    const rt::RealtimeSection section;
+    EXPECT_GT(climb_rate_mps(heading_from_fit(fit_similarity({}, flow)), 2.f, 0.1f), 0.f);
+  }
+  EXPECT_EQ(count.violations(), 0u);
 }
 
 }  // namespace

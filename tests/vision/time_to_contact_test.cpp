@@ -111,11 +111,17 @@ TEST(TimeToContact, BadInput) {
 
 TEST(TimeToContact, DoesNotAllocate) {
   const auto flow = approach(30.f, 0.1f);
+  const auto map = log_polar_geometry({}, 640, 480, kFoeX, kFoeY);
+  const auto fit = fit_similarity({}, flow);
   ContactRings rings;
+  ContactWindow window(3);
   const wasp::test::MallocCount count;
   {
     const rt::RealtimeSection section;
-    (void)contact_from_rings({}, flow, kFoeX, kFoeY, &rings);
+    EXPECT_TRUE(contact_from_rings({}, flow, kFoeX, kFoeY, &rings).valid);
+    EXPECT_TRUE(contact_from_log_polar({}, flow, map, &rings).valid);
+    EXPECT_TRUE(contact_from_scale({}, fit.log_scale, fit.log_scale_sigma, 1).valid);
+    for (int frame = 0; frame < 5; ++frame) (void)window.add(fit);
   }
   EXPECT_EQ(count.violations(), 0u);
 }

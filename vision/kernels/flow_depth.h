@@ -18,7 +18,8 @@ namespace wasp::vision {
 struct FlowDepthParams {
   float flow_sigma_px = 0.3f;       ///< one sigma of a component of the flow
   float max_relative_sigma = 0.2f;  ///< a depth less certain than this is no depth
-  float turn_sigma_rad = 0.001f;    ///< one sigma of the given rotation between the frames; 0: it is exact
+  float turn_sigma_rad = 0.00033f;  ///< one sigma of the given rotation between the frames; 0: it is exact. Default: a
+                                    ///< gyro bias of 0.01 rad/s over 1/30 s
   float min_depth_m = 0.05f, max_depth_m = 100.f;
   float max_off_line_sigmas = 4.f;  ///< flow that far off the line through the focus belongs to no still point
 };

@@ -3,7 +3,6 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
-#include <Eigen/Geometry>
 #include <cmath>
 #include <limits>
 
@@ -321,26 +320,6 @@ Foe find_foe_and_rotation(const FoeParams& params, const FlowField& flow, const 
   FoeParams tight = params;  // no remainder of a gyro to leave room for
   tight.inlier_px = std::min(params.inlier_px, kSolvedInlier_px);
   return refine(tight, scene, grid_consensus(scene, tight.inlier_px, cost));
-}
-
-void remove_rotation(const Intrinsics& k, const Vec3& rotation_rad, FlowField& flow) noexcept {
-  const float angle = rotation_rad.norm();
-  if (!std::isfinite(angle) || !(k.fx_px > 0.f) || !(k.fy_px > 0.f) || flow.columns < 1 || flow.rows < 1 ||
-      flow.columns > FlowField::kMaxColumns || flow.rows > FlowField::kMaxRows)
-    return;
-  if (!(angle > 0.f)) return;
-  const Mat3 R_first_second = Eigen::AngleAxisf(angle, rotation_rad / angle).toRotationMatrix();
-  for (int i = 0; i < flow.count(); ++i) {
-    FlowCell& cell = flow.cells[static_cast<std::size_t>(i)];
-    const Vec3 ray((cell.x_px + cell.u_px - k.cx_px) / k.fx_px, (cell.y_px + cell.v_px - k.cy_px) / k.fy_px, 1.f);
-    const Vec3 seen = R_first_second * ray;
-    if (!(seen.z() > 0.1f)) {
-      cell.valid = 0;
-      continue;
-    }
-    cell.u_px = k.fx_px * seen.x() / seen.z() + k.cx_px - cell.x_px;
-    cell.v_px = k.fy_px * seen.y() / seen.z() + k.cy_px - cell.y_px;
-  }
 }
 
 }  // namespace wasp::vision

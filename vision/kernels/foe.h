@@ -5,7 +5,7 @@
 //    p - e. The residual is the flow noise of one axis whatever the depth of the cell, so no cell is favoured. Start:
 //    consensus over intersections of pairs of flow lines; then Gauss-Newton with Tukey weights. With `rotation` the
 //    camera's own small turn is solved for together (5 unknowns); the start is then a search over a grid of e.
-// Fixed trip counts. The flow should be free of rotation unless it is solved for.
+// Fixed trip counts. The flow should be free of rotation (derotate.h) unless it is solved for.
 #pragma once
 
 #include "types/camera.h"
@@ -46,10 +46,5 @@ Foe find_foe(const FoeParams& params, const FlowField& flow) noexcept;
 /// The same with the camera's turn solved for (no distortion: cells in pinhole pixels). Needs depth variation or a
 /// wide view; the sigma says when it has neither. Realtime-safe: yes.
 Foe find_foe_and_rotation(const FoeParams& params, const FlowField& flow, const Intrinsics& intrinsics) noexcept;
-
-/// Turns the second frame back by `rotation_rad` (camera axes, from the first frame to the second): each cell's end
-/// point p2 becomes K R K^-1 p2. Exact for a pinhole at any depth: what is left is due to translation alone. Cells that
-/// would leave the front become invalid. Realtime-safe: yes.
-void remove_rotation(const Intrinsics& intrinsics, const Vec3& rotation_rad, FlowField& flow) noexcept;
 
 }  // namespace wasp::vision

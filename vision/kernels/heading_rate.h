@@ -1,6 +1,6 @@
 // Heading rate and height ratio from a camera that looks straight down (5.3): the image turns by minus the yaw, and
 // grows by the inverse of the height ratio. Default: similarity fit to the flow grid, which lets the ground shift under
-// the camera. (The thesis' phase correlation of log-polar maps needs a still optical centre and is not offered here.)
+// the camera. The thesis' own way, phase correlation of log-polar maps, is heading_log_polar.h.
 // Derivation: floor at height Z below a camera with flow f = (s e^(i theta) - 1) p + t: s = Z_k / Z_(k+1) ((5.6) is
 // misprinted: d rho = -M d ln Z). The camera's z axis is down, so a yaw of psi (clockwise from above) turns the scene
 // by -psi from x towards y.
