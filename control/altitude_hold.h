@@ -4,6 +4,7 @@
 #pragma once
 
 #include "control/pid.h"
+#include "types/realtime.h"
 
 namespace wasp::control {
 
@@ -24,11 +25,11 @@ struct AltitudeHoldState {
 };
 
 /// Hover thrust at this tilt, 0 ... 1 of full collective. `cos_tilt` = R_ned_body(2, 2). Realtime-safe: yes.
-float hover_thrust(const AltitudeHoldParams& params, float cos_tilt) noexcept;
+float hover_thrust(const AltitudeHoldParams& params, float cos_tilt) WASP_REALTIME;
 
 /// One period: height and climb rate as estimated, target height, `dt_s` > 0. Returns collective 0 ... 1. The setpoint
 /// starts where the vehicle is and ramps to the target. Realtime-safe: yes.
 float altitude_hold_step(const AltitudeHoldParams& params, float target_m, float height_m, float climb_rate_mps,
-                         float cos_tilt, float dt_s, AltitudeHoldState& state) noexcept;
+                         float cos_tilt, float dt_s, AltitudeHoldState& state) WASP_REALTIME;
 
 }  // namespace wasp::control

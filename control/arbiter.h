@@ -6,6 +6,7 @@
 #include <array>
 
 #include "types/messages.h"
+#include "types/realtime.h"
 
 namespace wasp::control {
 
@@ -43,9 +44,9 @@ struct Intention {
 
 /// True if the cue may be used at `now_ns`: valid, finite, made within its budget and within its age limit.
 /// Realtime-safe: yes.
-bool usable(const Cue& cue, const ArbiterRow& row, TimeNs now_ns) noexcept;
+bool usable(const Cue& cue, const ArbiterRow& row, TimeNs now_ns) WASP_REALTIME;
 
 /// Realtime-safe: yes.
-Intention arbitrate(const ArbiterParams& params, const CueSet& set, TimeNs now_ns) noexcept;
+Intention arbitrate(const ArbiterParams& params, const CueSet& set, TimeNs now_ns) WASP_REALTIME;
 
 }  // namespace wasp::control

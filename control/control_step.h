@@ -9,6 +9,7 @@
 #include "control/limits.h"
 #include "control/mission.h"
 #include "types/messages.h"
+#include "types/realtime.h"
 
 namespace wasp::control {
 
@@ -63,6 +64,6 @@ struct ControlOutput {
 };
 
 /// Realtime-safe: yes. Command::sent is 1 when the setpoint must go out, 0 when the stream stops on purpose.
-ControlOutput control_step(const ControlParams& params, const ControlInput& input, ControlState& state) noexcept;
+ControlOutput control_step(const ControlParams& params, const ControlInput& input, ControlState& state) WASP_REALTIME;
 
 }  // namespace wasp::control

@@ -6,24 +6,27 @@ namespace wasp::control {
 namespace {
 
 struct Row {
-  bool (*applies)(const Situation&) noexcept;
+  bool (*applies)(const Situation&) WASP_REALTIME;
   FlightMode mode;
   ModeReason reason;
 };
 
 constexpr std::array kRows = {
-    Row{[](const Situation& s) noexcept { return !s.autopilot_armed; }, FlightMode::kDisarmed,
+    Row{[](const Situation& s) WASP_REALTIME { return !s.autopilot_armed; }, FlightMode::kDisarmed,
         ModeReason::kMissionStep},
-    Row{[](const Situation& s) noexcept { return !s.link_alive; }, FlightMode::kFailsafe, ModeReason::kLinkLost},
-    Row{[](const Situation& s) noexcept { return !s.autopilot_follows; }, FlightMode::kManual,
+    Row{[](const Situation& s) WASP_REALTIME { return !s.link_alive; }, FlightMode::kFailsafe, ModeReason::kLinkLost},
+    Row{[](const Situation& s) WASP_REALTIME { return !s.autopilot_follows; }, FlightMode::kManual,
         ModeReason::kAutopilotLeft},
-    Row{[](const Situation& s) noexcept { return !s.attitude_fresh; }, FlightMode::kFailsafe,
+    Row{[](const Situation& s) WASP_REALTIME { return !s.attitude_fresh; }, FlightMode::kFailsafe,
         ModeReason::kAttitudeLost},
-    Row{[](const Situation& s) noexcept { return !s.setpoint_finite; }, FlightMode::kFailsafe, ModeReason::kNotFinite},
-    Row{[](const Situation& s) noexcept { return s.ground_lost_long; }, FlightMode::kFailsafe, ModeReason::kCueLost},
-    Row{[](const Situation& s) noexcept { return s.deadlines_missed; }, FlightMode::kHold, ModeReason::kDeadlineMissed},
-    Row{[](const Situation& s) noexcept { return !s.ground_seen; }, FlightMode::kHold, ModeReason::kCueLost},
-    Row{[](const Situation&) noexcept { return true; }, FlightMode::kBehaviour, ModeReason::kMissionStep},
+    Row{[](const Situation& s) WASP_REALTIME { return !s.setpoint_finite; }, FlightMode::kFailsafe,
+        ModeReason::kNotFinite},
+    Row{[](const Situation& s) WASP_REALTIME { return s.ground_lost_long; }, FlightMode::kFailsafe,
+        ModeReason::kCueLost},
+    Row{[](const Situation& s) WASP_REALTIME { return s.deadlines_missed; }, FlightMode::kHold,
+        ModeReason::kDeadlineMissed},
+    Row{[](const Situation& s) WASP_REALTIME { return !s.ground_seen; }, FlightMode::kHold, ModeReason::kCueLost},
+    Row{[](const Situation&) WASP_REALTIME { return true; }, FlightMode::kBehaviour, ModeReason::kMissionStep},
 };
 
 }  // namespace

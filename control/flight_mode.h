@@ -3,6 +3,7 @@
 #pragma once
 
 #include "types/messages.h"
+#include "types/realtime.h"
 
 namespace wasp::control {
 
@@ -24,9 +25,9 @@ struct ModeState {
 };
 
 /// Moves `state`; returns true if the mode changed. Realtime-safe: yes.
-bool flight_mode_step(const Situation& situation, ModeState& state) noexcept;
+bool flight_mode_step(const Situation& situation, ModeState& state) WASP_REALTIME;
 
-const char* name_of(FlightMode mode) noexcept;
-const char* name_of(ModeReason reason) noexcept;
+const char* name_of(FlightMode mode) WASP_REALTIME;
+const char* name_of(ModeReason reason) WASP_REALTIME;
 
 }  // namespace wasp::control

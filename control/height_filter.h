@@ -5,6 +5,7 @@
 
 #include <array>
 
+#include "types/realtime.h"
 #include "types/time.h"
 
 namespace wasp::control {
@@ -31,11 +32,12 @@ struct HeightFilterState {
 
 /// Carries the estimate to `now_ns` under the upward acceleration `accel_up_mps2` (gravity removed). Realtime-safe:
 /// yes.
-void predict(const HeightFilterParams& params, float accel_up_mps2, TimeNs now_ns, HeightFilterState& state) noexcept;
+void predict(const HeightFilterParams& params, float accel_up_mps2, TimeNs now_ns,
+             HeightFilterState& state) WASP_REALTIME;
 
 /// Corrects with a height seen at `exposed_at_ns`; an exposure not newer than the last is ignored. The first cue starts
 /// the filter. Realtime-safe: yes.
 void correct(const HeightFilterParams& params, float height_m, TimeNs exposed_at_ns, TimeNs now_ns,
-             HeightFilterState& state) noexcept;
+             HeightFilterState& state) WASP_REALTIME;
 
 }  // namespace wasp::control

@@ -1,6 +1,8 @@
 // The guard chain in front of the wire: finite check, range, then rate. What comes out can be sent.
 #pragma once
 
+#include "types/realtime.h"
+
 namespace wasp::control {
 
 /// An attitude setpoint on its way to the wire. Yaw is held by the autopilot; wasp commands its rate.
@@ -21,6 +23,6 @@ struct LimitParams {
 
 /// False, and `setpoint` untouched, if any field of `wanted` is not finite. Else `setpoint`, the last one sent, moves
 /// towards `wanted` within range and rate over `dt_s` > 0. Realtime-safe: yes.
-bool limit(const LimitParams& params, const Setpoint& wanted, float dt_s, Setpoint& setpoint) noexcept;
+bool limit(const LimitParams& params, const Setpoint& wanted, float dt_s, Setpoint& setpoint) WASP_REALTIME;
 
 }  // namespace wasp::control

@@ -4,6 +4,7 @@
 
 #include <array>
 
+#include "types/realtime.h"
 #include "types/time.h"
 
 namespace wasp::control {
@@ -56,13 +57,13 @@ struct MissionWish {
 };
 
 /// Realtime-safe: yes.
-MissionWish mission_step(const MissionParams& params, const MissionInput& input, MissionState& state) noexcept;
+MissionWish mission_step(const MissionParams& params, const MissionInput& input, MissionState& state) WASP_REALTIME;
 
 /// Index of the leg a phase stands for, -1 if it is not one.
-constexpr int leg_of(MissionPhase phase) noexcept {
+constexpr int leg_of(MissionPhase phase) WASP_REALTIME {
   const int i = static_cast<int>(phase) - static_cast<int>(MissionPhase::kLeg0);
   return i >= 0 && i < MissionParams::kMaxLegs ? i : -1;
 }
-const char* name_of(MissionPhase phase) noexcept;
+const char* name_of(MissionPhase phase) WASP_REALTIME;
 
 }  // namespace wasp::control

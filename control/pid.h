@@ -2,6 +2,8 @@
 // caller.
 #pragma once
 
+#include "types/realtime.h"
+
 namespace wasp::control {
 
 struct PidParams {
@@ -17,7 +19,8 @@ struct PidState {
 
 /// `error` = setpoint - measurement; `error_rate` its derivative (e.g. setpoint rate minus measured rate); `dt_s` > 0.
 /// The integral stands still while the output is saturated in its direction. Realtime-safe: yes.
-inline float pid_step(const PidParams& params, float error, float error_rate, float dt_s, PidState& state) noexcept {
+inline float pid_step(const PidParams& params, float error, float error_rate, float dt_s,
+                      PidState& state) WASP_REALTIME {
   const float increment = params.ki * error * dt_s;
   const float wanted = params.kp * error + state.integral + increment + params.kd * error_rate;
   const bool winding_up =

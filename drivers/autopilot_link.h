@@ -3,6 +3,7 @@
 // request and the accessors belong to one thread; the other encoders may run on any thread.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cstdint>
@@ -117,13 +118,13 @@ class AutopilotLink {
   [[nodiscard]] std::span<const mavlink::SourceCounts> sources() const noexcept { return parser_.sources(); }
   [[nodiscard]] const ClockMap& clock() const noexcept { return clock_; }
   /// The line was cut and is back: partial frames, open questions and the clock map are void. Counts stay.
-  void restart() noexcept;
+  void restart() WASP_REALTIME;
 
  private:
   enum Stream : std::size_t { kImuStream, kAttitudeStream, kStreams };
 
   template <class Sink>
-  void dispatch(const mavlink::Frame& frame, TimeNs received_at_ns, Sink& sink) noexcept {
+  void dispatch(const mavlink::Frame& frame, TimeNs received_at_ns, Sink& sink) WASP_REALTIME {
     switch (frame.message_id) {
       case mavlink::HighresImu::kId:
         return imu(frame.as<mavlink::HighresImu>(), 0, received_at_ns, sink);
@@ -151,7 +152,7 @@ class AutopilotLink {
   }
 
   template <class Message, class Sink>
-  void imu(const Message& message, int rank, TimeNs received_at_ns, Sink& sink) noexcept {
+  void imu(const Message& message, int rank, TimeNs received_at_ns, Sink& sink) WASP_REALTIME {
     if constexpr (requires { message.id; })
       if (message.id != 0) return;  // a second sensor of the same kind
     ImuSample sample;
@@ -162,7 +163,7 @@ class AutopilotLink {
   }
 
   template <class Message, class Sink>
-  void attitude(const Message& message, int rank, TimeNs received_at_ns, Sink& sink) noexcept {
+  void attitude(const Message& message, int rank, TimeNs received_at_ns, Sink& sink) WASP_REALTIME {
     AttitudeSample sample;
     if (!usable(convert(message, sample)) || !admitted(attitude_source_, rank, received_at_ns)) return;
     sample.exposed_at_ns = exposed_at(kAttitudeStream, remote_time_ns(message), received_at_ns);
@@ -171,26 +172,26 @@ class AutopilotLink {
   }
 
   template <class Sink>
-  void heartbeat(const mavlink::Heartbeat& m, TimeNs received_at_ns, Sink& sink) noexcept {
+  void heartbeat(const mavlink::Heartbeat& m, TimeNs received_at_ns, Sink& sink) WASP_REALTIME {
     const bool armed = (m.base_mode & mavlink::mav_mode_flag::kSafetyArmed) != 0;
     sink.on_heartbeat(
         AutopilotStatus{received_at_ns, m.custom_mode, m.base_mode, armed, m.system_status, m.type, m.autopilot});
   }
 
   template <class Sink>
-  void ack(const mavlink::CommandAck& m, Sink& sink) noexcept {
+  void ack(const mavlink::CommandAck& m, Sink& sink) WASP_REALTIME {
     if (for_us(m.target_system, m.target_component)) sink.on_ack(m.command, m.result);
   }
 
   /// Texts longer than 50 bytes arrive chunk by chunk.
   template <class Sink>
-  void statustext(const mavlink::Statustext& m, Sink& sink) noexcept {
+  void statustext(const mavlink::Statustext& m, Sink& sink) WASP_REALTIME {
     const std::string_view text(m.text.data(), m.text.size());
-    sink.on_statustext(m.severity, text.substr(0, text.find('\0')));
+    sink.on_statustext(m.severity, {text.data(), std::min(text.find('\0'), text.size())});
   }
 
   template <class Sink>
-  void timesync(const mavlink::Frame& frame, TimeNs received_at_ns, Sink& sink) noexcept {
+  void timesync(const mavlink::Frame& frame, TimeNs received_at_ns, Sink& sink) WASP_REALTIME {
     const auto m = frame.as<mavlink::Timesync>();
     if (!for_us(m.target_system, m.target_component)) return;
     if (m.tc1 != 0) return add_exchange(m, received_at_ns);
@@ -200,7 +201,7 @@ class AutopilotLink {
 
   /// PING is superseded but still answered when it asks everybody.
   template <class Sink>
-  void ping(const mavlink::Frame& frame, Sink& sink) noexcept {
+  void ping(const mavlink::Frame& frame, Sink& sink) WASP_REALTIME {
     auto m = frame.as<mavlink::Ping>();
     if (m.target_system != 0 || m.target_component != 0) return;
     m.target_system = frame.system_id;
@@ -210,14 +211,14 @@ class AutopilotLink {
 
   /// Every command addressed to us by name is answered; we support none.
   template <class Sink>
-  void refuse_command(const mavlink::Frame& frame, Sink& sink) noexcept {
+  void refuse_command(const mavlink::Frame& frame, Sink& sink) WASP_REALTIME {
     mavlink::CommandAck answer;
     if (!unsupported_command(frame, answer)) return;
     send(answer, sink);
   }
 
   template <class Message, class Sink>
-  void send(const Message& message, Sink& sink) noexcept {
+  void send(const Message& message, Sink& sink) WASP_REALTIME {
     std::array<std::uint8_t, mavlink::kMaxFrame> out;
     const std::size_t n = encoder_.encode(message, out);
     sink.reply(std::span<const std::uint8_t>(out.data(), n));
@@ -225,22 +226,22 @@ class AutopilotLink {
 
   /// Autopilot time of a message [ns]; -1 when it does not fit.
   template <class Message>
-  static TimeNs remote_time_ns(const Message& m) noexcept {
+  static TimeNs remote_time_ns(const Message& m) WASP_REALTIME {
     if constexpr (requires { m.time_boot_ms; })
       return static_cast<TimeNs>(m.time_boot_ms) * kMillisecond;
     else
       return m.time_usec <= INT64_MAX / 4000 ? static_cast<TimeNs>(m.time_usec) * kMicrosecond : -1;
   }
 
-  bool is_from_autopilot(const mavlink::Frame& frame) noexcept;
-  bool for_us(std::uint8_t target_system, std::uint8_t target_component) noexcept;
-  bool usable(Finiteness finiteness) noexcept;
-  bool admitted(PreferredSource& source, int rank, TimeNs received_at_ns) noexcept;
-  bool unsupported_command(const mavlink::Frame& frame, mavlink::CommandAck& answer) const noexcept;
-  void add_exchange(const mavlink::Timesync& answer, TimeNs received_at_ns) noexcept;
-  TimeNs exposed_at(Stream stream, TimeNs remote_ns, TimeNs received_at_ns) noexcept;
-  void restart_clock() noexcept;
-  void share_offset(TimeNs now_ns) noexcept;
+  bool is_from_autopilot(const mavlink::Frame& frame) WASP_REALTIME;
+  bool for_us(std::uint8_t target_system, std::uint8_t target_component) WASP_REALTIME;
+  bool usable(Finiteness finiteness) WASP_REALTIME;
+  bool admitted(PreferredSource& source, int rank, TimeNs received_at_ns) WASP_REALTIME;
+  bool unsupported_command(const mavlink::Frame& frame, mavlink::CommandAck& answer) const WASP_REALTIME;
+  void add_exchange(const mavlink::Timesync& answer, TimeNs received_at_ns) WASP_REALTIME;
+  TimeNs exposed_at(Stream stream, TimeNs remote_ns, TimeNs received_at_ns) WASP_REALTIME;
+  void restart_clock() WASP_REALTIME;
+  void share_offset(TimeNs now_ns) WASP_REALTIME;
 
   LinkIdentity identity_;
   mavlink::Parser parser_;

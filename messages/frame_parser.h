@@ -32,7 +32,7 @@ class Parser {
   [[nodiscard]] const Counts& counts() const noexcept { return counts_; }
   [[nodiscard]] std::span<const SourceCounts> sources() const noexcept { return sources_.rows(); }
   /// Forgets a partial frame (the line was cut); counts stay.
-  void reset() noexcept;
+  void reset() WASP_REALTIME;
 
  private:
   enum class Verdict { kNeedMore, kNotAFrame, kPassOver, kGood };
@@ -43,20 +43,20 @@ class Parser {
     std::size_t header = 0, total = 0;  ///< bytes of the header, and of the whole frame
   };
 
-  std::size_t take(std::span<const std::uint8_t> bytes) noexcept;
-  bool next(Frame& frame) noexcept;
-  Verdict examine(Claim& claim) noexcept;
+  std::size_t take(std::span<const std::uint8_t> bytes) WASP_REALTIME;
+  bool next(Frame& frame) WASP_REALTIME;
+  Verdict examine(Claim& claim) WASP_REALTIME;
   Verdict examine_unverifiable(const Claim& claim, std::uint64_t Counts::*total,
-                               std::uint64_t SourceCounts::*row) noexcept;
-  Verdict refuse_header() noexcept;
-  Verdict check(Claim& claim, std::uint8_t crc_extra) noexcept;
-  bool read_header(std::size_t at, Claim& claim) const noexcept;
-  bool checksum_holds(std::size_t at, const Claim& claim, std::uint8_t crc_extra) const noexcept;
-  int steps_ahead(const Frame& frame, const Frame& before) noexcept;
-  bool swallows_a_frame(const Claim& claim, const Frame& follower) noexcept;
-  void drop(std::size_t n) noexcept;
-  [[nodiscard]] bool frame_is_due() const noexcept { return offset_ == due_; }
-  [[nodiscard]] std::size_t available() const noexcept { return tail_ - head_; }
+                               std::uint64_t SourceCounts::*row) WASP_REALTIME;
+  Verdict refuse_header() WASP_REALTIME;
+  Verdict check(Claim& claim, std::uint8_t crc_extra) WASP_REALTIME;
+  bool read_header(std::size_t at, Claim& claim) const WASP_REALTIME;
+  bool checksum_holds(std::size_t at, const Claim& claim, std::uint8_t crc_extra) const WASP_REALTIME;
+  int steps_ahead(const Frame& frame, const Frame& before) WASP_REALTIME;
+  bool swallows_a_frame(const Claim& claim, const Frame& follower) WASP_REALTIME;
+  void drop(std::size_t n) WASP_REALTIME;
+  [[nodiscard]] bool frame_is_due() const WASP_REALTIME { return offset_ == due_; }
+  [[nodiscard]] std::size_t available() const WASP_REALTIME { return tail_ - head_; }
 
   std::array<std::uint8_t, 1024> buffer_;  ///< bytes [head_, tail_) are not yet decided on
   std::size_t head_ = 0, tail_ = 0;

@@ -1,15 +1,10 @@
-// The real-time contract. A function marked WASP_REALTIME takes no lock, allocates nothing, throws nothing, makes no
-// virtual call, does no I/O outside the listed calls and has bounded loops. clang >= 20 checks it as a function effect;
-// everywhere else the malloc guard and the system-call filter check it at run time.
+// Real-time sections: where a thread is bound by the contract that WASP_REALTIME (types/realtime.h) states. The malloc
+// guard of the tests reads the depth.
 #pragma once
 
 #include <atomic>
 
-#if defined(__clang__) && __clang_major__ >= 20
-#define WASP_REALTIME noexcept [[clang::nonblocking]]
-#else
-#define WASP_REALTIME noexcept
-#endif
+#include "types/realtime.h"
 
 namespace wasp::rt {
 

@@ -42,16 +42,17 @@ class BehaviourLoop {
     RealtimeLoop loop(control);
     const bool in_order = wiring_.frames_done != nullptr;
     if (in_order) frames_.from_the_start();
-    while (loop.tick()) {
-      if (const Frame frame = frames_.wait(rt::now() + 100 * kMillisecond, in_order)) serve(frame);
-      if (frames_.lost() != lost_reported_) {
-        control.status->frames_lost.fetch_add(frames_.lost() - lost_reported_);
-        lost_reported_ = frames_.lost();
-      }
-    }
+    while (loop.tick()) cycle(control, in_order);
   }
 
  private:
+  void cycle(LoopControl& control, bool in_order) WASP_REALTIME {
+    if (const Frame frame = frames_.wait(rt::now() + 100 * kMillisecond, in_order)) serve(frame);
+    if (frames_.lost() == lost_reported_) return;
+    control.status->frames_lost.fetch_add(frames_.lost() - lost_reported_);
+    lost_reported_ = frames_.lost();
+  }
+
   void serve(const Frame& frame) WASP_REALTIME {
     Cue cue;
     cue.started_at_ns = rt::now();

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cstring>
 #include <string_view>
 
@@ -32,8 +31,12 @@ class EventQueue {
   /// With a number behind the text. Realtime-safe: yes.
   void say(TimeNs at_ns, std::string_view head, long number) WASP_REALTIME {
     std::array<char, 24> digits;
-    const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), number).ptr;
-    say(at_ns, head, std::string_view(digits.data(), static_cast<std::size_t>(end - digits.data())));
+    char* const end = digits.data() + digits.size();
+    char* begin = end;
+    unsigned long rest = number < 0 ? 0ul - static_cast<unsigned long>(number) : static_cast<unsigned long>(number);
+    for (; begin == end || rest != 0; rest /= 10) *--begin = static_cast<char>('0' + rest % 10);
+    if (number < 0) *--begin = '-';
+    say(at_ns, head, std::string_view(begin, static_cast<std::size_t>(end - begin)));
   }
   bool take(Event& e) noexcept { return queue_.pop(e); }
   [[nodiscard]] std::uint64_t dropped() const noexcept { return dropped_; }

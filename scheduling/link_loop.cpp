@@ -24,11 +24,15 @@ LinkLoop::LinkLoop(const shm::Region& flight, drivers::SerialPort& port, drivers
 
 void LinkLoop::run(LoopControl& control) {
   RealtimeLoop loop(control);
-  while (loop.tick()) serve(control);
+  while (loop.tick()) {
+    if (gone_)
+      reopen(control);
+    else
+      serve(control);
+  }
 }
 
 void LinkLoop::serve(LoopControl& control) WASP_REALTIME {
-  if (gone_) return reopen(control);
   ask_for_time(rt::now());
   if (!port_.wait_readable(rt::now() + kPatience)) return;
   for (int i = 0; i < kReadsPerWake; ++i) {  // bounded: a flood cannot hold this thread for ever
@@ -56,7 +60,8 @@ void LinkLoop::ask_for_time(TimeNs now_ns) WASP_REALTIME {
   reply(std::span<const std::uint8_t>(out.data(), autopilot_.encode_timesync_request(now_ns, out)));
 }
 
-void LinkLoop::reopen(LoopControl& control) WASP_REALTIME {
+void LinkLoop::reopen(LoopControl& control) {
+  const rt::NonRealtimeSection opening;  // nothing waits for a line that is gone
   rt::sleep_until(rt::now() + kReopenPeriod);
   if (!port_.try_reopen()) return;
   gone_ = false;

@@ -31,7 +31,7 @@ class LinkLoop {
  private:
   void serve(LoopControl& control) WASP_REALTIME;
   void ask_for_time(TimeNs now_ns) WASP_REALTIME;
-  void reopen(LoopControl& control) WASP_REALTIME;
+  void reopen(LoopControl& control);
 
   drivers::SerialPort& port_;
   drivers::AutopilotLink& autopilot_;

@@ -118,6 +118,11 @@ void ReplayCamera::publish(const DecodedFrame& frame, TimeNs exposed_at_ns) WASP
 
 void ReplayCamera::run(LoopControl& control) {
   RealtimeLoop loop(control);
+  publish_all(loop, control);
+  finished_ = true;
+}
+
+void ReplayCamera::publish_all(RealtimeLoop& loop, LoopControl& control) WASP_REALTIME {
   TimeNs start_ns = kNever;
   while (loop.tick()) {
     std::uint32_t slot = 0;
@@ -139,7 +144,6 @@ void ReplayCamera::run(LoopControl& control) {
     published_.fetch_add(1, std::memory_order_relaxed);
     pool_.give_empty(slot);
   }
-  finished_ = true;
 }
 
 }  // namespace wasp::scheduling

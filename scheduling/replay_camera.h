@@ -52,6 +52,7 @@ class ReplayCamera {
     std::atomic<std::uint64_t> done{0};
   };
   bool decode_one(std::size_t index, DurationNs offset_ns, std::uint32_t sequence, DecodedFrame& frame);
+  void publish_all(RealtimeLoop& loop, LoopControl& control) WASP_REALTIME;
   void publish(const DecodedFrame& frame, TimeNs exposed_at_ns) WASP_REALTIME;
   [[nodiscard]] bool readers_keep_up() const noexcept;
 

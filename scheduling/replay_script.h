@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "types/messages.h"
+#include "types/realtime.h"
 
 namespace wasp::scheduling {
 
@@ -25,6 +26,6 @@ using BehaviourScript = std::vector<ScriptedStep>;
 std::map<std::string, BehaviourScript> load_replay_script(const std::string& folder);
 
 /// Step for a frame, nullptr if the behaviour skipped it when the recording was made. Realtime-safe: yes.
-const ScriptedStep* find_step(const BehaviourScript& script, std::uint32_t frame_sequence) noexcept;
+const ScriptedStep* find_step(const BehaviourScript& script, std::uint32_t frame_sequence) WASP_REALTIME;
 
 }  // namespace wasp::scheduling

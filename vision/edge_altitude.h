@@ -6,6 +6,7 @@
 
 #include "types/behaviour.h"
 #include "types/camera.h"
+#include "types/realtime.h"
 #include "vision/kernels/edge_height.h"
 #include "vision/kernels/edge_rows.h"
 
@@ -48,7 +49,7 @@ struct EdgeAltitude {
   /// detail: (7.36)'s height, mu, misfit, edge share, threshold, first floor row, model (1 distribution, 2 count) and
   /// the height of this frame alone. A frame older than the last one, or a gap above 1 s, restarts the filter.
   /// Survives any input. Realtime-safe: yes.
-  static CueBody step(const Params& params, const BehaviourInput& input, State& state) noexcept;
+  static CueBody step(const Params& params, const BehaviourInput& input, State& state) WASP_REALTIME;
 };
 
 static_assert(Behaviour<EdgeAltitude>);

@@ -7,6 +7,7 @@
 
 #include "types/behaviour.h"
 #include "types/camera.h"
+#include "types/realtime.h"
 #include "vision/kernels/depth_plane.h"
 
 namespace wasp::vision {
@@ -47,7 +48,7 @@ struct GroundAltitude {
   /// quality: 0 ... 1, inlier share of valid samples times share of valid samples, saturating at a tenth.
   /// detail: floor normal in camera axes, perpendicular height, inlier share, below share, rms residual, and the angle
   /// between the normal and the prior's up. Survives any input. Realtime-safe: yes.
-  static CueBody step(const Params& params, const BehaviourInput& input, State& state) noexcept;
+  static CueBody step(const Params& params, const BehaviourInput& input, State& state) WASP_REALTIME;
 };
 
 static_assert(Behaviour<GroundAltitude>);

@@ -6,6 +6,8 @@
 #include <array>
 #include <cstdint>
 
+#include "types/realtime.h"
+
 namespace wasp::vision {
 
 inline constexpr int kMaxAvoidPairs = 16;
@@ -31,25 +33,25 @@ struct AvoidDecision {
 };
 
 /// Two-sided p-value of Student's t with `freedom` degrees of freedom (1 ... 30; others give 1). Realtime-safe: yes.
-double student_t_two_sided(double t, int freedom) noexcept;
+double student_t_two_sided(double t, int freedom) WASP_REALTIME;
 
 /// The running history. Plain data.
 class AvoidMonitor {
  public:
-  explicit AvoidMonitor(const AvoidParams& params = {}) noexcept;
+  explicit AvoidMonitor(const AvoidParams& params = {}) WASP_REALTIME;
 
   /// Adds one pair and decides. A time-to-contact that is not finite, or a frame number not above the last one, is not
   /// added and cannot give avoid. Realtime-safe: yes.
-  AvoidDecision add(std::int64_t frame, float time_to_contact_frames) noexcept;
+  AvoidDecision add(std::int64_t frame, float time_to_contact_frames) WASP_REALTIME;
   /// Forgets everything: the approach was interrupted. Realtime-safe: yes.
-  void reset() noexcept { count_ = 0; }
+  void reset() WASP_REALTIME { count_ = 0; }
 
  private:
   struct Pair {
     std::int64_t frame = 0;
     float time_to_contact = 0;
   };
-  [[nodiscard]] Regression regress() const noexcept;
+  [[nodiscard]] Regression regress() const WASP_REALTIME;
 
   AvoidParams params_;
   std::array<Pair, kMaxAvoidPairs> pairs_{};  // oldest first

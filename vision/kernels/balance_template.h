@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <span>
 
+#include "types/realtime.h"
 #include "vision/kernels/cluster.h"
 #include "vision/kernels/flow_field.h"
 
@@ -38,7 +39,8 @@ struct GrossForce {
 
 /// Cells that are invalid or not finite do not count; a focus that is not finite, a field of impossible size or
 /// parameters out of range give an invalid force. Realtime-safe: yes.
-GrossForce gross_force(const BalanceParams& params, const FlowField& flow, float foe_x_px, float foe_y_px) noexcept;
+GrossForce gross_force(const BalanceParams& params, const FlowField& flow, float foe_x_px,
+                       float foe_y_px) WASP_REALTIME;
 
 /// The mean of the last ten forces (6.16), or of all while there are fewer. Summed anew each time: (6.16)'s running
 /// form gathers rounding errors for as long as the flight lasts.
@@ -48,7 +50,7 @@ struct ForceAverage {
   int count = 0, next = 0;
 
   /// Adds `force` (0 for a component that is not finite) and returns the mean. Realtime-safe: yes.
-  ImageForce add(const ImageForce& force) noexcept;
+  ImageForce add(const ImageForce& force) WASP_REALTIME;
 };
 
 /// One obstacle: the cells of one cluster.
@@ -65,7 +67,8 @@ struct Obstacles {
 
 /// Obstacles of `clusters` of the observations [X_u, X_v], whose cells lie at (x_px, y_px): centre of the cells, mean
 /// of both depths. None if the clusters are invalid or the sizes differ. Realtime-safe: yes.
-Obstacles obstacles_of(const Clusters& clusters, std::span<const float> x_px, std::span<const float> y_px) noexcept;
+Obstacles obstacles_of(const Clusters& clusters, std::span<const float> x_px,
+                       std::span<const float> y_px) WASP_REALTIME;
 
 struct FineParams {
   float max_distance_px = 300.f;  ///< k_l: farther from the focus is the gross force's business
@@ -81,11 +84,11 @@ struct FineParams {
 /// with no direction (under 0.001 px) as lying against `gross`, so that both forces agree; without a gross force, as
 /// lying left, so that the vehicle goes right. Anything not finite counts as no obstacle. Realtime-safe: yes.
 ImageForce fine_force(const FineParams& params, const Obstacles& obstacles, float foe_x_px, float foe_y_px,
-                      const ImageForce& gross) noexcept;
+                      const ImageForce& gross) WASP_REALTIME;
 
 /// k_c F_c + k_f F_f (6.15).
 constexpr ImageForce net_force(const ImageForce& gross, float gross_gain, const ImageForce& fine,
-                               float fine_gain) noexcept {
+                               float fine_gain) WASP_REALTIME {
   return {gross_gain * gross.x + fine_gain * fine.x, gross_gain * gross.y + fine_gain * fine.y};
 }
 

@@ -11,7 +11,7 @@
 namespace wasp::vision {
 namespace {
 
-using Pass = void (*)(const ClusterPoints&, const ClusterMeans&, ClusterPass&) noexcept;
+using Pass = void (*)(const ClusterPoints&, const ClusterMeans&, ClusterPass&) WASP_REALTIME;
 constexpr float kMaxCoordinate = 1e9f;
 
 bool sane(const ClusterParams& p) noexcept {

@@ -7,6 +7,8 @@
 #include <cstdint>
 #include <span>
 
+#include "types/realtime.h"
+
 namespace wasp::vision {
 
 inline constexpr int kMaxObservations = 192;  ///< cells of the largest flow grid
@@ -36,10 +38,10 @@ struct Clusters {
 /// Clusters the points (x[i], y[i]). Invalid for sizes that differ, none or more than kMaxObservations of them,
 /// parameters out of range, or an observation that is not finite or beyond 1e9. Stops a restart early once no mean
 /// moves. Time: at most restarts * max_iterations passes over the points. Realtime-safe: yes.
-Clusters cluster_points(const ClusterParams& params, std::span<const float> x, std::span<const float> y) noexcept;
+Clusters cluster_points(const ClusterParams& params, std::span<const float> x, std::span<const float> y) WASP_REALTIME;
 
 /// The same in plain loops: what the SIMD form must equal but for the order in which sums are rounded.
 Clusters cluster_points_reference(const ClusterParams& params, std::span<const float> x,
-                                  std::span<const float> y) noexcept;
+                                  std::span<const float> y) WASP_REALTIME;
 
 }  // namespace wasp::vision

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "types/realtime.h"
 #include "vision/kernels/cluster.h"
 
 namespace wasp::vision {
@@ -28,8 +29,8 @@ struct ClusterPass {
 };
 
 /// Equal distances go to the mean of lower index. Realtime-safe: yes.
-void cluster_pass_reference(const ClusterPoints& points, const ClusterMeans& means, ClusterPass& out) noexcept;
+void cluster_pass_reference(const ClusterPoints& points, const ClusterMeans& means, ClusterPass& out) WASP_REALTIME;
 /// The same in SIMD; sums are rounded in another order. Realtime-safe: yes.
-void cluster_pass_simd(const ClusterPoints& points, const ClusterMeans& means, ClusterPass& out) noexcept;
+void cluster_pass_simd(const ClusterPoints& points, const ClusterMeans& means, ClusterPass& out) WASP_REALTIME;
 
 }  // namespace wasp::vision

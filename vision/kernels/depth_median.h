@@ -7,6 +7,7 @@
 #include <span>
 
 #include "types/image_view.h"
+#include "types/realtime.h"
 
 namespace wasp::vision {
 
@@ -18,7 +19,7 @@ inline constexpr int kMaxMedianColumns = 2048, kMaxMedianRows = 32768;
 /// to the nearer of the valid values. `out` has the shape of `depth`, `out_stride_px` elements from row to row, and
 /// must not overlap it. False, with nothing written, for a bad view, null, a short stride, or above the limits.
 /// Realtime-safe: yes.
-bool median_5x5(const DepthView& depth, std::uint16_t* out, int out_stride_px) noexcept;
+bool median_5x5(const DepthView& depth, std::uint16_t* out, int out_stride_px) WASP_REALTIME;
 
 struct DepthPixel {
   std::int16_t u_px = 0, v_px = 0;
@@ -29,6 +30,6 @@ struct DepthPixel {
 /// pixel lies outside the image. False, with `out` all 0, for a bad view, other sizes of `pixels` and `out`, or above
 /// the limits. Time: fixed for each 32 pixels or part of it. Realtime-safe: yes.
 bool median_5x5_at(const DepthView& depth, std::span<const DepthPixel> pixels, int min_valid,
-                   std::span<std::uint16_t> out) noexcept;
+                   std::span<std::uint16_t> out) WASP_REALTIME;
 
 }  // namespace wasp::vision

@@ -9,6 +9,7 @@
 
 #include "types/camera.h"
 #include "types/image_view.h"
+#include "types/realtime.h"
 #include "vision/kernels/depth_samples.h"
 #include "vision/kernels/plane_fit.h"
 #include "vision/kernels/pseudo_random.h"
@@ -60,6 +61,6 @@ struct DepthPlaneState {
 /// parameters that are not finite, give an invalid estimate. Bounded: at most three rounds of fixed trip counts, the
 /// second and third only when the one before found no floor. Realtime-safe: yes.
 PlaneEstimate estimate_floor(const DepthPlaneParams& params, const Intrinsics& intrinsics, const DepthView& depth,
-                             const GravityPrior& prior, DepthPlaneState& state) noexcept;
+                             const GravityPrior& prior, DepthPlaneState& state) WASP_REALTIME;
 
 }  // namespace wasp::vision

@@ -8,6 +8,7 @@
 
 #include "types/camera.h"
 #include "types/image_view.h"
+#include "types/realtime.h"
 
 namespace wasp::vision {
 
@@ -38,10 +39,10 @@ struct DepthRange {
 };
 
 /// Rebuilds `table` if it is not for these intrinsics. False when they are unusable. Realtime-safe: yes (bounded).
-bool prepare(SampleTable& table, const Intrinsics& k) noexcept;
+bool prepare(SampleTable& table, const Intrinsics& k) WASP_REALTIME;
 
 /// Gathers the samples of `depth` (uint16 millimetres; 0 and 65535 are invalid) into `out`.
 /// Needs an image of the table's size. Realtime-safe: yes.
-void gather(const SampleTable& table, const DepthView& depth, const DepthRange& range, DepthSamples& out) noexcept;
+void gather(const SampleTable& table, const DepthView& depth, const DepthRange& range, DepthSamples& out) WASP_REALTIME;
 
 }  // namespace wasp::vision

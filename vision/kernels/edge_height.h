@@ -17,6 +17,7 @@
 #include <cstdint>
 
 #include "types/camera.h"
+#include "types/realtime.h"
 #include "vision/kernels/edge_rows.h"
 
 namespace wasp::vision {
@@ -47,14 +48,15 @@ struct EdgeHeight {
 
 /// Which model and which kind of edge a camera held like this calls for: rows of horizontal edges where the rows'
 /// ground footprints differ enough from top to bottom, the count of edges of any direction where they do not.
-EdgeModel suitable_model(const EdgeHeightParams& params, const Intrinsics& intrinsics, const Vec3& up_cam) noexcept;
-inline EdgeKind suitable_kind(EdgeModel model) noexcept {
+EdgeModel suitable_model(const EdgeHeightParams& params, const Intrinsics& intrinsics,
+                         const Vec3& up_cam) WASP_REALTIME;
+inline EdgeKind suitable_kind(EdgeModel model) WASP_REALTIME {
   return model == EdgeModel::kCount ? EdgeKind::kAnyDirection : EdgeKind::kHorizontal;
 }
 
 /// `up_cam` is the unit world up in camera axes; roll is taken as small. Invalid when edges are few, no row shows
 /// floor, the answer sits on a bound, or a parameter makes no sense. Constant trip counts. Realtime-safe: yes.
 EdgeHeight estimate_edge_height(const EdgeHeightParams& params, const Intrinsics& intrinsics, const Vec3& up_cam,
-                                const EdgeRows& rows) noexcept;
+                                const EdgeRows& rows) WASP_REALTIME;
 
 }  // namespace wasp::vision

@@ -11,8 +11,8 @@ namespace wasp::vision {
 namespace {
 
 struct Sweeps {
-  std::uint64_t (*squares)(const GrayView&, EdgeKind) noexcept;
-  void (*count)(const EdgeSweep&, EdgeRows&) noexcept;
+  std::uint64_t (*squares)(const GrayView&, EdgeKind) WASP_REALTIME;
+  void (*count)(const EdgeSweep&, EdgeRows&) WASP_REALTIME;
 };
 
 bool usable(const GrayView& image) noexcept {

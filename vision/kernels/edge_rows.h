@@ -7,6 +7,7 @@
 #include <cstdint>
 
 #include "types/image_view.h"
+#include "types/realtime.h"
 
 namespace wasp::vision {
 
@@ -37,6 +38,6 @@ struct EdgeRows {
 /// Counts edges of `image`. `depth` (same size, 0 = unknown = not masked) may be empty. Invalid for a bad view, fewer
 /// than 3 x 3 pixels or a larger image than the limits. Realtime-safe: yes.
 void count_edge_rows(const EdgeRowsParams& params, const GrayView& image, const DepthView& depth,
-                     EdgeRows& out) noexcept;
+                     EdgeRows& out) WASP_REALTIME;
 
 }  // namespace wasp::vision

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 
+#include "types/realtime.h"
 #include "vision/kernels/edge_rows.h"
 
 namespace wasp::vision {
@@ -18,13 +19,13 @@ struct EdgeSweep {
 };
 
 /// Sum of squared gradients over interior pixels. Exact. Realtime-safe: yes.
-std::uint64_t gradient_squares_reference(const GrayView& image, EdgeKind kind) noexcept;
+std::uint64_t gradient_squares_reference(const GrayView& image, EdgeKind kind) WASP_REALTIME;
 
 /// Fills out.count of the interior rows; touches nothing else. Realtime-safe: yes.
-void count_rows_reference(const EdgeSweep& sweep, EdgeRows& out) noexcept;
+void count_rows_reference(const EdgeSweep& sweep, EdgeRows& out) WASP_REALTIME;
 
 /// count_edge_rows on the scalar path throughout. Realtime-safe: yes.
 void count_edge_rows_reference(const EdgeRowsParams& params, const GrayView& image, const DepthView& depth,
-                               EdgeRows& out) noexcept;
+                               EdgeRows& out) WASP_REALTIME;
 
 }  // namespace wasp::vision

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "types/image_view.h"
+#include "types/realtime.h"
 #include "vision/kernels/flow_field.h"
 
 namespace wasp::vision {
@@ -42,20 +43,20 @@ class EmdGrid {
 
   /// The next frame, mono8 of the constructor's size; frames must come at a constant rate. A bad view leaves the state
   /// alone and gives an invalid field. Time depends on sizes only. Realtime-safe: yes.
-  void step(const GrayView& image, EmdField& out) noexcept;
+  void step(const GrayView& image, EmdField& out) WASP_REALTIME;
 
   /// Forgets all frames. Realtime-safe: yes.
-  void reset() noexcept { frames_ = 0; }
+  void reset() WASP_REALTIME { frames_ = 0; }
 
  private:
   struct Receptor {
     float mean = 0, signal = 0, delayed = 0;
   };
-  [[nodiscard]] const Receptor& at(int column, int row) const noexcept {
+  [[nodiscard]] const Receptor& at(int column, int row) const WASP_REALTIME {
     return receptors_[static_cast<std::size_t>(row * across_ + column)];
   }
-  void see(const GrayView& image) noexcept;
-  void correlate(EmdField& out) const noexcept;
+  void see(const GrayView& image) WASP_REALTIME;
+  void correlate(EmdField& out) const WASP_REALTIME;
 
   EmdParams params_;
   int width_px_, height_px_, across_, down_;

@@ -25,8 +25,8 @@ fftwf_plan checked(fftwf_plan plan) {
 
 }  // namespace
 
-void detail::FftFree::operator()(void* p) const noexcept { fftwf_free(p); }
-void detail::FftFree::operator()(fftwf_plan_s* p) const noexcept { fftwf_destroy_plan(p); }
+void detail::FftFree::operator()(void* p) const { fftwf_free(p); }
+void detail::FftFree::operator()(fftwf_plan_s* p) const { fftwf_destroy_plan(p); }
 
 FftBuffer<float> fft_reals(std::size_t count) {
   FftBuffer<float> buffer(fftwf_alloc_real(count));

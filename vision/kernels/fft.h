@@ -7,6 +7,8 @@
 #include <memory>
 #include <string>
 
+#include "types/realtime.h"
+
 struct fftwf_plan_s;
 
 namespace wasp::vision {
@@ -16,8 +18,8 @@ enum class FftPlanning { kMeasure, kEstimate };
 
 namespace detail {
 struct FftFree {
-  void operator()(void* p) const noexcept;
-  void operator()(fftwf_plan_s* p) const noexcept;
+  void operator()(void* p) const;
+  void operator()(fftwf_plan_s* p) const;
 };
 }  // namespace detail
 
@@ -35,9 +37,9 @@ class ComplexFft {
   ComplexFft() = default;
   /// Throws std::invalid_argument for a size below 1, std::runtime_error when FFTW has no plan.
   ComplexFft(int rows, int columns, FftPlanning planning);
-  [[nodiscard]] std::complex<float>* data() const noexcept { return data_.get(); }
+  [[nodiscard]] std::complex<float>* data() const WASP_REALTIME { return data_.get(); }
   /// Realtime-safe: yes.
-  void execute() const noexcept;
+  void execute() const WASP_REALTIME;
 
  private:
   FftBuffer<std::complex<float>> data_;
@@ -50,11 +52,11 @@ class RealFft {
  public:
   RealFft() = default;
   RealFft(int rows, int columns, FftPlanning planning);
-  [[nodiscard]] float* real() const noexcept { return real_.get(); }
-  [[nodiscard]] std::complex<float>* spectrum() const noexcept { return spectrum_.get(); }
+  [[nodiscard]] float* real() const WASP_REALTIME { return real_.get(); }
+  [[nodiscard]] std::complex<float>* spectrum() const WASP_REALTIME { return spectrum_.get(); }
   /// Realtime-safe: yes, all.
-  void forward() const noexcept;
-  void inverse() const noexcept;
+  void forward() const WASP_REALTIME;
+  void inverse() const WASP_REALTIME;
 
  private:
   FftBuffer<float> real_;
@@ -63,7 +65,7 @@ class RealFft {
 };
 
 /// Smallest size >= n that FFTW's codelets like: even, and made of factors 2, 3 and 5. At least 2.
-int good_fft_size(int n) noexcept;
+int good_fft_size(int n) WASP_REALTIME;
 
 /// What the planner has learnt, as text: keep it in a file beside the configuration and hand it back before the plans
 /// are made, so that start-up measures nothing and picks the same plans every time. Realtime-safe: no.

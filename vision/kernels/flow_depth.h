@@ -9,6 +9,7 @@
 #include <array>
 
 #include "types/camera.h"
+#include "types/realtime.h"
 #include "vision/kernels/camera_model.h"
 #include "vision/kernels/derotate.h"
 #include "vision/kernels/flow_field.h"
@@ -49,11 +50,11 @@ using PrintedDepthGrid = std::array<PrintedDepthCell, FlowField::kMaxColumns * F
 /// Index as in `flow`. All invalid for a bad camera step (see derotate) or one without translation.
 /// Realtime-safe: yes.
 void flow_depth(const FlowDepthParams& params, const Lens& lens, const FlowField& flow, const CameraStep& camera,
-                DepthGrid& out) noexcept;
+                DepthGrid& out) WASP_REALTIME;
 
 /// (6.11) with the corrected signs, to first order in the rotation. A denominator within `max_relative_sigma` of zero
 /// gives no depth. Realtime-safe: yes.
 void flow_depth_printed(const FlowDepthParams& params, const Lens& lens, const FlowField& flow,
-                        const CameraStep& camera, PrintedDepthGrid& out) noexcept;
+                        const CameraStep& camera, PrintedDepthGrid& out) WASP_REALTIME;
 
 }  // namespace wasp::vision

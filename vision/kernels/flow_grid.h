@@ -11,6 +11,7 @@
 #include <cstdint>
 
 #include "types/image_view.h"
+#include "types/realtime.h"
 #include "vision/kernels/flow_field.h"
 #include "vision/kernels/flow_grid_tiles.h"
 #include "vision/kernels/flow_pyramid.h"
@@ -45,13 +46,15 @@ class FlowGrid {
 
   /// Motion from `first` to `second`, mono8 of the constructor's size. All cells invalid for bad views.
   /// Realtime-safe: yes.
-  void track(const GrayView& first, const GrayView& second, FlowField& out) noexcept;
+  void track(const GrayView& first, const GrayView& second, FlowField& out) WASP_REALTIME;
 
   /// Affine motion of a cell (row * columns + column) in the last call, in full-image pixels.
-  [[nodiscard]] const CellMotion& motion(int cell) const noexcept { return motions_[static_cast<std::size_t>(cell)]; }
-  [[nodiscard]] const FlowGridTrips& trips() const noexcept { return trips_; }
+  [[nodiscard]] const CellMotion& motion(int cell) const WASP_REALTIME {
+    return motions_[static_cast<std::size_t>(cell)];
+  }
+  [[nodiscard]] const FlowGridTrips& trips() const WASP_REALTIME { return trips_; }
   /// Bound of trips(), from sizes and parameters alone.
-  [[nodiscard]] FlowGridTrips worst_case() const noexcept;
+  [[nodiscard]] FlowGridTrips worst_case() const WASP_REALTIME;
 
  private:
   static constexpr int kMaxCells = FlowField::kMaxColumns * FlowField::kMaxRows;
@@ -59,17 +62,17 @@ class FlowGrid {
   struct Level;
   struct Fit;
 
-  [[nodiscard]] Level level_of(int level) const noexcept;
-  void clear(FlowField& out) const noexcept;
-  void run(const FlowPyramid& from, const FlowPyramid& to, Motions& motions, FlowField& out) noexcept;
-  CellMotion start(const Level& above, const Motions& motions_above, const GrayView& second, Fit& fit) noexcept;
-  void cut(const GrayView& first, Fit& fit) noexcept;
-  float compare(const GrayView& second, const CellMotion& motion, Fit& fit) noexcept;
-  void refine(const GrayView& second, int max_steps, CellMotion& motion, Fit& fit) noexcept;
-  bool step(CellMotion& motion, const CellMotion& prior, Fit& fit) noexcept;
-  [[nodiscard]] float shift_sigma_px(const BlockSums& sums) const noexcept;
-  void judge(const Fit& fit, const CellMotion& motion, FlowCell& cell) const noexcept;
-  void check_backward(FlowField& out) noexcept;
+  [[nodiscard]] Level level_of(int level) const WASP_REALTIME;
+  void clear(FlowField& out) const WASP_REALTIME;
+  void run(const FlowPyramid& from, const FlowPyramid& to, Motions& motions, FlowField& out) WASP_REALTIME;
+  CellMotion start(const Level& above, const Motions& motions_above, const GrayView& second, Fit& fit) WASP_REALTIME;
+  void cut(const GrayView& first, Fit& fit) WASP_REALTIME;
+  float compare(const GrayView& second, const CellMotion& motion, Fit& fit) WASP_REALTIME;
+  void refine(const GrayView& second, int max_steps, CellMotion& motion, Fit& fit) WASP_REALTIME;
+  bool step(CellMotion& motion, const CellMotion& prior, Fit& fit) WASP_REALTIME;
+  [[nodiscard]] float shift_sigma_px(const BlockSums& sums) const WASP_REALTIME;
+  void judge(const Fit& fit, const CellMotion& motion, FlowCell& cell) const WASP_REALTIME;
+  void check_backward(FlowField& out) WASP_REALTIME;
 
   FlowGridParams params_;
   FlowPyramid first_, second_;

@@ -5,6 +5,7 @@
 
 #include <array>
 
+#include "types/realtime.h"
 #include "vision/kernels/flow_grid_tiles.h"
 
 namespace wasp::vision {
@@ -17,6 +18,6 @@ struct AffineStep {
 /// `off` is the shift's distance from its prior; the affine terms' prior is zero. `shift` and `affine` are the priors'
 /// information [grey^2]. False when the matrix is not positive. Realtime-safe: yes.
 bool solve_affine_step(const BlockSums& sums, const std::array<float, 2>& off, const CellMotion& motion, float shift,
-                       float affine, AffineStep& out) noexcept;
+                       float affine, AffineStep& out) WASP_REALTIME;
 
 }  // namespace wasp::vision

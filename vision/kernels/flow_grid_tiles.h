@@ -8,6 +8,7 @@
 #include <cstdint>
 
 #include "types/image_view.h"
+#include "types/realtime.h"
 
 namespace wasp::vision {
 
@@ -34,7 +35,7 @@ struct TileBlock {
   alignas(64) PerTile x_px{}, y_px{};              ///< centre of its gradient energy, from the cell's centre
   alignas(64) PerTile nearness{}, per_expected{};  ///< weight by distance; 1 / expected sum of squares
   float gray_sum = 0, gray_squares = 0;            ///< over the block
-  [[nodiscard]] int tiles() const noexcept { return across * across; }
+  [[nodiscard]] int tiles() const WASP_REALTIME { return across * across; }
 };
 
 /// Where a block is cut, and what its tiles are expected to differ by.
@@ -55,24 +56,25 @@ struct BlockSums {
 };
 
 /// Realtime-safe: yes.
-void cut_block(const GrayView& image, const BlockSite& site, TileBlock& out) noexcept;
+void cut_block(const GrayView& image, const BlockSite& site, TileBlock& out) WASP_REALTIME;
 
 /// Compares every tile with `second` where `motion` puts it. A tile counts as outside unless it lies in the image with
 /// one pixel to spare on the right and below; it is not read then. Realtime-safe: yes.
-void compare_block(const TileBlock& block, const GrayView& second, const CellMotion& motion, BlockSums& out) noexcept;
+void compare_block(const TileBlock& block, const GrayView& second, const CellMotion& motion,
+                   BlockSums& out) WASP_REALTIME;
 
 /// One tile of each in plain loops, for machines without SIMD and for tests; the same integers.
 /// `p` is the tile's top left pixel.
-void cut_tile_plain(const std::uint8_t* p, std::ptrdiff_t stride, int tile, TileBlock& out) noexcept;
+void cut_tile_plain(const std::uint8_t* p, std::ptrdiff_t stride, int tile, TileBlock& out) WASP_REALTIME;
 struct TileErrors {
   float bx = 0, by = 0, squares = 0;  ///< sums of gradient times difference [grey^2/px] and of squares [grey^2]
 };
 /// Parts of a pixel are in 1/32768.
 TileErrors compare_tile_plain(const TileBlock& block, int tile, const std::uint8_t* p, std::ptrdiff_t stride,
-                              int u_part, int v_part) noexcept;
+                              int u_part, int v_part) WASP_REALTIME;
 
 /// The SIMD form of compare_tile_plain as dispatched, for tests.
 TileErrors compare_tile(const TileBlock& block, int tile, const std::uint8_t* p, std::ptrdiff_t stride, int u_part,
-                        int v_part) noexcept;
+                        int v_part) WASP_REALTIME;
 
 }  // namespace wasp::vision

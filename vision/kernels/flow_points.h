@@ -6,6 +6,7 @@
 #include <cmath>
 #include <span>
 
+#include "types/realtime.h"
 #include "vision/kernels/flow_field.h"
 
 namespace wasp::vision {
@@ -20,14 +21,14 @@ struct FlowPoints {
   std::array<FlowPoint, kMaxFlowPoints> points{};
   int count = 0;
 
-  [[nodiscard]] std::span<const FlowPoint> view() const noexcept {
+  [[nodiscard]] std::span<const FlowPoint> view() const WASP_REALTIME {
     return {points.data(), static_cast<std::size_t>(count)};
   }
 };
 
 /// Valid, finite cells, positions relative to (centre_x, centre_y); none for a field of impossible shape.
 /// Realtime-safe: yes.
-inline void collect_points(const FlowField& flow, float centre_x_px, float centre_y_px, FlowPoints& out) noexcept {
+inline void collect_points(const FlowField& flow, float centre_x_px, float centre_y_px, FlowPoints& out) WASP_REALTIME {
   out.count = 0;
   if (flow.columns < 1 || flow.rows < 1 || flow.columns > FlowField::kMaxColumns || flow.rows > FlowField::kMaxRows)
     return;
@@ -41,7 +42,7 @@ inline void collect_points(const FlowField& flow, float centre_x_px, float centr
 }
 
 /// Upper median of `values`, which are reordered; 0 when empty. Realtime-safe: yes.
-inline float median_in_place(std::span<float> values) noexcept {
+inline float median_in_place(std::span<float> values) WASP_REALTIME {
   if (values.empty()) return 0.f;
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
@@ -49,7 +50,7 @@ inline float median_in_place(std::span<float> values) noexcept {
 }
 
 /// Tukey's biweight: 1 at 0, 0 from `limit` on. Realtime-safe: yes.
-inline float biweight(float residual_squared, float limit) noexcept {
+inline float biweight(float residual_squared, float limit) WASP_REALTIME {
   const float t = 1.f - residual_squared / (limit * limit);
   return t > 0.f ? t * t : 0.f;
 }

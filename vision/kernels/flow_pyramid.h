@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "types/image_view.h"
+#include "types/realtime.h"
 
 namespace wasp::vision {
 
@@ -22,10 +23,10 @@ class FlowPyramid {
 
   /// Fills the levels from `image`, which must outlive their use. False (and no level) for a bad view or another size.
   /// Realtime-safe: yes.
-  bool build(const GrayView& image) noexcept;
+  bool build(const GrayView& image) WASP_REALTIME;
 
-  [[nodiscard]] int levels() const noexcept { return levels_; }
-  [[nodiscard]] const GrayView& level(int i) const noexcept { return views_[static_cast<std::size_t>(i)]; }
+  [[nodiscard]] int levels() const WASP_REALTIME { return levels_; }
+  [[nodiscard]] const GrayView& level(int i) const WASP_REALTIME { return views_[static_cast<std::size_t>(i)]; }
 
  private:
   int width_px_, height_px_, levels_ = 0;
@@ -36,6 +37,6 @@ class FlowPyramid {
 
 /// One halving step: `out` holds (width/2) x (height/2) pixels, row after row with `out_stride_px`; `row` is scratch of
 /// width + 32 elements. SIMD, the same result on every machine. Realtime-safe: yes.
-void halve_image(const GrayView& in, std::uint8_t* out, int out_stride_px, std::uint16_t* row) noexcept;
+void halve_image(const GrayView& in, std::uint8_t* out, int out_stride_px, std::uint16_t* row) WASP_REALTIME;
 
 }  // namespace wasp::vision

@@ -189,7 +189,11 @@ double ellipse(const Scene& scene, const Normal& sums) noexcept {
   Eigen::Matrix2d a = sums.a.topLeftCorner<2, 2>();
   if (scene.with_rotation) {  // information on e with the turn unknown: the Schur complement
     const Eigen::Matrix3d turn = sums.a.bottomRightCorner<3, 3>() + 1e-9 * Eigen::Matrix3d::Identity();
-    a -= sums.a.topRightCorner<2, 3>() * turn.ldlt().solve(sums.a.bottomLeftCorner<3, 2>());
+    const Eigen::LDLT<Eigen::Matrix3d> factors(turn);
+    for (int column = 0; column < 2; ++column) {  // one at a time: a matrix on the right would go through the heap
+      const Eigen::Vector3d right = sums.a.block<3, 1>(2, column);
+      a.col(column) -= sums.a.topRightCorner<2, 3>() * factors.solve(right);
+    }
   }
   const double half = 0.5 * a.trace();
   const double least = half - std::sqrt(std::max(half * half - a.determinant(), 0.0));

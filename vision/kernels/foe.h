@@ -9,6 +9,7 @@
 #pragma once
 
 #include "types/camera.h"
+#include "types/realtime.h"
 #include "vision/kernels/flow_field.h"
 
 namespace wasp::vision {
@@ -38,13 +39,13 @@ struct Foe {
 /// (5.11, 5.12): centre of the column (row) of least mean u^2 (v^2). Columns and rows without a valid cell do not
 /// count; invalid with fewer than `params.min_cells` valid cells. sigma, residual and inliers stay 0. Realtime-safe:
 /// yes.
-Foe printed_foe(const FoeParams& params, const FlowField& flow) noexcept;
+Foe printed_foe(const FoeParams& params, const FlowField& flow) WASP_REALTIME;
 
 /// Robust least squares; the camera does not turn, or its turn has been taken out. Realtime-safe: yes.
-Foe find_foe(const FoeParams& params, const FlowField& flow) noexcept;
+Foe find_foe(const FoeParams& params, const FlowField& flow) WASP_REALTIME;
 
 /// The same with the camera's turn solved for (no distortion: cells in pinhole pixels). Needs depth variation or a
 /// wide view; the sigma says when it has neither. Realtime-safe: yes.
-Foe find_foe_and_rotation(const FoeParams& params, const FlowField& flow, const Intrinsics& intrinsics) noexcept;
+Foe find_foe_and_rotation(const FoeParams& params, const FlowField& flow, const Intrinsics& intrinsics) WASP_REALTIME;
 
 }  // namespace wasp::vision

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "types/realtime.h"
 #include "vision/kernels/heading_rate.h"
 #include "vision/kernels/image_shift.h"
 #include "vision/kernels/log_polar.h"
@@ -34,10 +35,10 @@ class HeadingLogPolar {
 
   /// The motion since the frame before. Invalid for the first frame, for one that follows a bad one, without texture,
   /// or when the regions disagree. At most `regions` phase correlations. Realtime-safe: yes.
-  HeadingRate step(const GrayView& image) noexcept;
+  HeadingRate step(const GrayView& image) WASP_REALTIME;
 
   /// Forgets the last frame. Realtime-safe: yes.
-  void reset() noexcept { has_last_ = false; }
+  void reset() WASP_REALTIME { has_last_ = false; }
 
  private:
   struct Region {
@@ -47,10 +48,10 @@ class HeadingLogPolar {
   struct Shift {
     float turn_rad = 0, log_scale = 0;
   };
-  void blur() noexcept;
-  int choose_regions() noexcept;
-  bool measure(const Region& region, Shift& out) noexcept;
-  [[nodiscard]] HeadingRate mean_of(int count) const noexcept;
+  void blur() WASP_REALTIME;
+  int choose_regions() WASP_REALTIME;
+  bool measure(const Region& region, Shift& out) WASP_REALTIME;
+  [[nodiscard]] HeadingRate mean_of(int count) const WASP_REALTIME;
 
   HeadingLogPolarParams params_;
   LogPolarMap map_;

@@ -6,6 +6,7 @@
 // by -psi from x towards y.
 #pragma once
 
+#include "types/realtime.h"
 #include "vision/kernels/similarity_fit.h"
 
 namespace wasp::vision {
@@ -19,10 +20,10 @@ struct HeadingRate {
 };
 
 /// From a fit. Invalid with it, and when a sigma exceeds `max_sigma` (rad, and relative). Realtime-safe: yes.
-HeadingRate heading_from_fit(const SimilarityFit& fit, float max_sigma = 0.02f) noexcept;
+HeadingRate heading_from_fit(const SimilarityFit& fit, float max_sigma = 0.02f) WASP_REALTIME;
 
 /// Vertical speed, up positive [m/s]: (ratio - 1) Z_k / dt, from the height at the first frame. 0 for an invalid
 /// estimate or a step that is not positive. Realtime-safe: yes.
-float climb_rate_mps(const HeadingRate& rate, float height_m, float step_s) noexcept;
+float climb_rate_mps(const HeadingRate& rate, float height_m, float step_s) WASP_REALTIME;
 
 }  // namespace wasp::vision

@@ -10,6 +10,7 @@
 
 #include "types/camera.h"
 #include "types/image_view.h"
+#include "types/realtime.h"
 #include "vision/kernels/depth_samples.h"
 #include "vision/kernels/hough_samplers.h"
 
@@ -40,10 +41,10 @@ struct HoughPlane {
 class RandomizedHough {
  public:
   /// Draws the tuples. Not for the flight loop.
-  RandomizedHough(const HoughParams& params, const Intrinsics& intrinsics) noexcept;
+  RandomizedHough(const HoughParams& params, const Intrinsics& intrinsics) WASP_REALTIME;
 
   /// One frame; invalid when no cell reaches T_A, or the view does not fit the intrinsics. Realtime-safe: yes.
-  HoughPlane detect(const DepthView& depth) noexcept;
+  HoughPlane detect(const DepthView& depth) WASP_REALTIME;
 
  private:
   struct Cell {
@@ -54,11 +55,12 @@ class RandomizedHough {
   static constexpr std::uint32_t kSlots = 2 * kHoughTuples;
   static constexpr std::uint32_t kEmpty = 0xffffffffu;
 
-  [[nodiscard]] bool span(const DepthView& depth, const PixelTuple& tuple, Vec3& normal, float& rho_m) const noexcept;
-  [[nodiscard]] bool point(const DepthView& depth, int u, int v, Vec3& out) const noexcept;
-  [[nodiscard]] std::uint32_t key_of(const Vec3& normal, float rho_m) const noexcept;
-  Cell& vote(std::uint32_t key, const Vec3& normal, float rho_m) noexcept;
-  [[nodiscard]] HoughPlane answer(const Cell& cell) const noexcept;
+  [[nodiscard]] bool span(const DepthView& depth, const PixelTuple& tuple, Vec3& normal,
+                          float& rho_m) const WASP_REALTIME;
+  [[nodiscard]] bool point(const DepthView& depth, int u, int v, Vec3& out) const WASP_REALTIME;
+  [[nodiscard]] std::uint32_t key_of(const Vec3& normal, float rho_m) const WASP_REALTIME;
+  Cell& vote(std::uint32_t key, const Vec3& normal, float rho_m) WASP_REALTIME;
+  [[nodiscard]] HoughPlane answer(const Cell& cell) const WASP_REALTIME;
 
   HoughParams params_;
   Intrinsics intrinsics_;

@@ -6,6 +6,8 @@
 #include <array>
 #include <cstdint>
 
+#include "types/realtime.h"
+
 namespace wasp::vision {
 
 enum class HoughSampler : std::uint8_t { kNaive, kLocalCartesian, kLocalImage, kOrthogonal };
@@ -26,6 +28,6 @@ struct HoughSamplerParams {
 
 /// Fills `tuples` with pixels inside width x height (both at least 8). Realtime-safe: bounded, but meant for start-up.
 void draw_tuples(const HoughSamplerParams& params, int width_px, int height_px,
-                 std::array<PixelTuple, kHoughTuples>& tuples) noexcept;
+                 std::array<PixelTuple, kHoughTuples>& tuples) WASP_REALTIME;
 
 }  // namespace wasp::vision

@@ -300,8 +300,8 @@ ImageShift ImageShiftPlan::estimate(const GrayView& first, const GrayView& secon
     shift::halve_image(fine_.second.data(), fine_.pitch, coarse_.rows, coarse_.columns, coarse_.second.data(),
                        coarse_.pitch);
   } else {
-    coarse_.first = fine_.first;
-    coarse_.second = fine_.second;
+    std::copy(fine_.first.begin(), fine_.first.end(), coarse_.first.begin());
+    std::copy(fine_.second.begin(), fine_.second.end(), coarse_.second.begin());
   }
   Offset coarse;
   if (!coarse_shift(coarse)) return out;

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "types/image_view.h"
+#include "types/realtime.h"
 #include "vision/kernels/fft.h"
 #include "vision/kernels/image_shift_rows.h"
 
@@ -41,7 +42,7 @@ class ImageShiftPlan {
 
   /// Both views must have the plan's size; otherwise the result is invalid. At most two passes of four Newton steps;
   /// the time does not depend on the content beyond that. Realtime-safe: yes.
-  ImageShift estimate(const GrayView& first, const GrayView& second) noexcept;
+  ImageShift estimate(const GrayView& first, const GrayView& second) WASP_REALTIME;
 
  private:
   struct Level {
@@ -68,23 +69,23 @@ class ImageShiftPlan {
 
   void size_level(Level& level, int bin) const;
   void size_spectrum(Spectrum& spectrum, const Level& level, double band, double sigma) const;
-  [[nodiscard]] const float* window(int bins) const noexcept { return windows_.data() + bins * window_pitch_; }
+  [[nodiscard]] const float* window(int bins) const WASP_REALTIME { return windows_.data() + bins * window_pitch_; }
   void pack(const Spectrum& spectrum, const float* first, const float* second, int pitch, int rows,
-            int columns) noexcept;
-  bool coarse_shift(Offset& found) noexcept;
-  void correlate_coarse() noexcept;
-  [[nodiscard]] float overlap_coefficient(int x, int y) const noexcept;
-  [[nodiscard]] Peak highest() const noexcept;
-  [[nodiscard]] Offset vertex(const Peak& peak) const noexcept;
-  void measure_row(int v) noexcept;
-  void remove(const Peak& peak) noexcept;
-  [[nodiscard]] float& surface_at(int u, int v) const noexcept {
+            int columns) WASP_REALTIME;
+  bool coarse_shift(Offset& found) WASP_REALTIME;
+  void correlate_coarse() WASP_REALTIME;
+  [[nodiscard]] float overlap_coefficient(int x, int y) const WASP_REALTIME;
+  [[nodiscard]] Peak highest() const WASP_REALTIME;
+  [[nodiscard]] Offset vertex(const Peak& peak) const WASP_REALTIME;
+  void measure_row(int v) WASP_REALTIME;
+  void remove(const Peak& peak) WASP_REALTIME;
+  [[nodiscard]] float& surface_at(int u, int v) const WASP_REALTIME {
     const int row = v < 0 ? v + surface_rows_ : v, column = u < 0 ? u + surface_columns_ : u;
     return surface_.real()[row * surface_columns_ + column];
   }
-  bool fine_shift(const GrayView& second, Offset start, Offset& found, ImageShift& out) noexcept;
-  bool climb(const Spectrum& spectrum, Offset& at, shift::PeakSums& peak, int steps) noexcept;
-  void set_phasors(const Spectrum& spectrum, Offset at) noexcept;
+  bool fine_shift(const GrayView& second, Offset start, Offset& found, ImageShift& out) WASP_REALTIME;
+  bool climb(const Spectrum& spectrum, Offset& at, shift::PeakSums& peak, int steps) WASP_REALTIME;
+  void set_phasors(const Spectrum& spectrum, Offset at) WASP_REALTIME;
 
   int width_px_, height_px_;
   ImageShiftParams params_;

@@ -20,13 +20,13 @@ std::vector<float> window(int n, bool hann) {
 }
 
 /// Distance of a parabola's vertex from the middle of three samples.
-float parabola(float low, float mid, float high) noexcept {
+float parabola(float low, float mid, float high) WASP_REALTIME {
   const float bend = low - 2.f * mid + high;
   return bend < 0.f ? 0.5f * (low - high) / bend : 0.f;
 }
 
 /// Foroosh: the peak c0 and its higher neighbour c1 lie c1 / (c1 + c0) from the true shift (a Dirichlet kernel).
-float side_peak(float low, float mid, float high) noexcept {
+float side_peak(float low, float mid, float high) WASP_REALTIME {
   const float c1 = std::max(low, high);
   if (!(c1 > 0.f) || !(c1 + mid > 0.f)) return 0.f;
   return (high > low ? 1.f : -1.f) * c1 / (c1 + mid);
@@ -87,7 +87,7 @@ void ShiftReference::find_peak(ShiftMethod method, ImageShift& out) const noexce
   const float* begin = fft_.real();
   const int at = static_cast<int>(std::max_element(begin, begin + width_px_ * height_px_) - begin);
   const int x = centred(at % width_px_, width_px_), y = centred(at / width_px_, height_px_);
-  float (*fraction)(float, float, float) noexcept = nullptr;
+  float (*fraction)(float, float, float) WASP_REALTIME = nullptr;
   if (method == ShiftMethod::kCrossCorrelationSubpixel) fraction = &parabola;
   if (method == ShiftMethod::kForoosh) fraction = &side_peak;
   out.x_px = static_cast<float>(x);

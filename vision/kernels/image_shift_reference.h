@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "types/image_view.h"
+#include "types/realtime.h"
 #include "vision/kernels/fft.h"
 #include "vision/kernels/image_shift.h"
 
@@ -31,16 +32,16 @@ class ShiftReference {
 
   /// Motion from first to second as in ImageShift; `coefficient` and `quality` are (3.15) at the estimate's nearest
   /// whole pixel; valid says only that the input was good. Realtime-safe: yes.
-  ImageShift estimate(ShiftMethod method, const GrayView& first, const GrayView& second) noexcept;
+  ImageShift estimate(ShiftMethod method, const GrayView& first, const GrayView& second) WASP_REALTIME;
 
  private:
-  [[nodiscard]] std::size_t spectrum_size() const noexcept;
-  void transform(const GrayView& image, std::vector<std::complex<float>>& spectrum) noexcept;
-  void shear_average(ImageShift& out) const noexcept;
-  void correlate(bool phase_only) noexcept;
-  void find_peak(ShiftMethod method, ImageShift& out) const noexcept;
-  [[nodiscard]] float surface(int x, int y) const noexcept;
-  [[nodiscard]] double energy(const std::vector<std::complex<float>>& spectrum) const noexcept;
+  [[nodiscard]] std::size_t spectrum_size() const WASP_REALTIME;
+  void transform(const GrayView& image, std::vector<std::complex<float>>& spectrum) WASP_REALTIME;
+  void shear_average(ImageShift& out) const WASP_REALTIME;
+  void correlate(bool phase_only) WASP_REALTIME;
+  void find_peak(ShiftMethod method, ImageShift& out) const WASP_REALTIME;
+  [[nodiscard]] float surface(int x, int y) const WASP_REALTIME;
+  [[nodiscard]] double energy(const std::vector<std::complex<float>>& spectrum) const WASP_REALTIME;
 
   int width_px_, height_px_;
   RealFft fft_;

@@ -7,6 +7,7 @@
 #include <cstdint>
 
 #include "types/image_view.h"
+#include "types/realtime.h"
 
 namespace wasp::vision::shift {
 
@@ -17,25 +18,29 @@ inline constexpr int kLanesMargin = 16;  ///< floats that rows may be read past 
 /// Bins of bin x bin pixels (bin a power of two up to kMaxBin) from pixel (x, y), rows x columns of them, `pitch`
 /// floats a row. Each bin weighs 1 3 3 1 (by 1 3 3 1) the half bins about it, up to a scale: plain sums would alias,
 /// and aliases move the wrong way. Half bins beyond the area repeat its edge. The pixels must lie inside the view.
-void bin_image(const GrayView& image, int x, int y, int bin, int rows, int columns, float* out, int pitch) noexcept;
+void bin_image(const GrayView& image, int x, int y, int bin, int rows, int columns, float* out,
+               int pitch) WASP_REALTIME;
 
 /// The same from binned to twice as coarse: rows and columns are the result's.
-void halve_image(const float* in, int in_pitch, int rows, int columns, float* out, int pitch) noexcept;
+void halve_image(const float* in, int in_pitch, int rows, int columns, float* out, int pitch) WASP_REALTIME;
 
 /// sum of wy[r] wx[c] image[r][c].
-float weighted_sum(const float* image, int pitch, int rows, int columns, const float* wx, const float* wy) noexcept;
+float weighted_sum(const float* image, int pitch, int rows, int columns, const float* wx,
+                   const float* wy) WASP_REALTIME;
 
 /// z[r][c] = wy[r] wx[c] ((a - mean_a) + j (b - mean_b)) in the top left rows x columns of z (z_rows x z_columns), 0
 /// elsewhere.
 void pack_pair(const float* a, const float* b, int pitch, int rows, int columns, float mean_a, float mean_b,
-               const float* wx, const float* wy, std::complex<float>* z, int z_rows, int z_columns) noexcept;
+               const float* wx, const float* wy, std::complex<float>* z, int z_rows, int z_columns) WASP_REALTIME;
 
 /// Rows -rows_v ... rows_v by columns 0 ... columns_u of a half spectrum, as separate planes, `pitch` floats a row.
 struct Band {
   float *re = nullptr, *im = nullptr;
   int rows_v = 0, columns_u = 0, pitch = 0;
-  [[nodiscard]] std::ptrdiff_t offset(int v) const noexcept { return static_cast<std::ptrdiff_t>(v + rows_v) * pitch; }
-  [[nodiscard]] int rows() const noexcept { return 2 * rows_v + 1; }
+  [[nodiscard]] std::ptrdiff_t offset(int v) const WASP_REALTIME {
+    return static_cast<std::ptrdiff_t>(v + rows_v) * pitch;
+  }
+  [[nodiscard]] int rows() const WASP_REALTIME { return 2 * rows_v + 1; }
 };
 
 /// Energies of the two spectra inside a band (times 4).
@@ -45,14 +50,14 @@ struct BandEnergy {
 
 /// H = F2 conj(F1) (3.13) (times 4) from the transform of f1 + j f2, inside the band. Needs rows_v < z_rows / 2 and
 /// columns_u < z_columns / 2, columns_u + 16 < z_columns; the band's rows must be padded to kLanesMargin.
-BandEnergy cross_power(const std::complex<float>* z, int z_rows, int z_columns, const Band& band) noexcept;
+BandEnergy cross_power(const std::complex<float>* z, int z_rows, int z_columns, const Band& band) WASP_REALTIME;
 
 /// Mean of |H| over the band's columns u >= u_from (all rows).
-float mean_magnitude(const Band& band, int u_from) noexcept;
+float mean_magnitude(const Band& band, int u_from) WASP_REALTIME;
 
 /// G = H |H| wx[u] wy[v] / (|H|^2 + noise^2), same shapes; wy starts at row -rows_v; noise 0 is phase only.
 /// Returns the sum of |G|.
-float whiten(const Band& h, float noise, const float* wx, const float* wy, const Band& g) noexcept;
+float whiten(const Band& h, float noise, const float* wx, const float* wy, const Band& g) WASP_REALTIME;
 
 /// Correlation and its derivatives at one shift: sums over the band of t = G ex[u] ey[v].
 struct PeakSums {
@@ -61,15 +66,15 @@ struct PeakSums {
 
 /// ex, ey: unit phasors as (cos, sin) arrays; ey starts at row -rows_v. Derivatives are by the phase step per bin.
 PeakSums peak_sums(const Band& band, const float* ex_re, const float* ex_im, const float* ey_re,
-                   const float* ey_im) noexcept;
+                   const float* ey_im) WASP_REALTIME;
 
 /// Largest value of a row and its column.
-float max_of(const float* values, int count) noexcept;
+float max_of(const float* values, int count) WASP_REALTIME;
 
 /// Sums over the overlap of two images for the normalised coefficient (3.15).
 struct OverlapSums {
   float a = 0, b = 0, aa = 0, bb = 0, ab = 0;
 };
-OverlapSums overlap_sums(const float* a, const float* b, int pitch, int rows, int columns) noexcept;
+OverlapSums overlap_sums(const float* a, const float* b, int pitch, int rows, int columns) WASP_REALTIME;
 
 }  // namespace wasp::vision::shift

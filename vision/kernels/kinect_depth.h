@@ -9,6 +9,7 @@
 #include <cstdint>
 
 #include "types/image_view.h"
+#include "types/realtime.h"
 
 namespace wasp::vision {
 
@@ -23,19 +24,19 @@ struct KinectRange {
 
 /// What `model` makes of one raw value [m]; 0 for 2047, a value that is not 11 bit, or a depth outside the range.
 /// Not for pixels: it works out exponentials. Realtime-safe: yes.
-float kinect_depth_m(KinectModel model, int raw, const KinectRange& range = {}) noexcept;
+float kinect_depth_m(KinectModel model, int raw, const KinectRange& range = {}) WASP_REALTIME;
 
 struct KinectTable {
   std::array<std::uint16_t, kKinectRawValues> mm{};  ///< rounded; 0 = invalid
 };
 
 /// All 2,048 values, at start-up. A range that is not finite, positive and rising gives a table of zeros.
-KinectTable make_kinect_table(KinectModel model, const KinectRange& range = {}) noexcept;
+KinectTable make_kinect_table(KinectModel model, const KinectRange& range = {}) WASP_REALTIME;
 
 /// Fills `out_mm` (the shape of `raw`, `out_stride_px` elements from row to row; `out_mm` may be raw.data itself) with
 /// millimetres, 0 = invalid. Raw values above 11 bits are invalid. False, with nothing written, for a bad view, null,
 /// or a short stride. Time: one look-up a pixel. Realtime-safe: yes.
 bool kinect_depth(const KinectTable& table, const ImageView<std::uint16_t>& raw, std::uint16_t* out_mm,
-                  int out_stride_px) noexcept;
+                  int out_stride_px) WASP_REALTIME;
 
 }  // namespace wasp::vision

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "types/realtime.h"
 #include "vision/kernels/log_polar_remap.h"
 
 namespace wasp::vision {
@@ -38,21 +39,22 @@ struct LogPolarGeometry {
     float phi;  ///< row, 0 <= phi < angles
   };
   /// (5.4). The fovea itself has phi = 0. Realtime-safe: yes.
-  [[nodiscard]] MapPoint to_map(ImagePoint p) const noexcept;
+  [[nodiscard]] MapPoint to_map(ImagePoint p) const WASP_REALTIME;
   /// (D.14). Realtime-safe: yes.
-  [[nodiscard]] ImagePoint to_image(MapPoint p) const noexcept;
-  [[nodiscard]] float rho_of(float r_px) const noexcept;  ///< M log(r + kappa); r is limited to the map's first column
-  [[nodiscard]] float radius_of(float rho) const noexcept;  ///< e^(rho / M) - kappa
-  [[nodiscard]] float rad_per_row() const noexcept;         ///< 2 pi / N_phi
+  [[nodiscard]] ImagePoint to_image(MapPoint p) const WASP_REALTIME;
+  [[nodiscard]] float rho_of(float r_px) const
+      WASP_REALTIME;  ///< M log(r + kappa); r is limited to the map's first column
+  [[nodiscard]] float radius_of(float rho) const WASP_REALTIME;  ///< e^(rho / M) - kappa
+  [[nodiscard]] float rad_per_row() const WASP_REALTIME;         ///< 2 pi / N_phi
   /// Scale s of the image from a shift of columns: e^(delta / M), exact for kappa = 0.
-  [[nodiscard]] float scale_of(float delta_rho) const noexcept;
+  [[nodiscard]] float scale_of(float delta_rho) const WASP_REALTIME;
 };
 
 /// Geometry for an image of this size with the fovea at (x, y), which is moved into the image, one pixel from its
 /// border, when it lies outside: an expansion centre outside the image still gets the nearest usable map. A fovea that
 /// is no number becomes the image centre. Realtime-safe: yes.
 LogPolarGeometry log_polar_geometry(const LogPolarParams& params, int width_px, int height_px, float fovea_x_px,
-                                    float fovea_y_px) noexcept;
+                                    float fovea_y_px) WASP_REALTIME;
 
 /// Tables for both directions. Copying copies the tables.
 class LogPolarMap {
@@ -63,19 +65,19 @@ class LogPolarMap {
   LogPolarMap(const LogPolarParams& params, int width_px, int height_px, int stride_px, float fovea_x_px,
               float fovea_y_px);
 
-  [[nodiscard]] const LogPolarGeometry& geometry() const noexcept { return geometry_; }
+  [[nodiscard]] const LogPolarGeometry& geometry() const WASP_REALTIME { return geometry_; }
   /// Columns of row `angle` that lie inside the image: 0 ... n-1. Realtime-safe: yes.
-  [[nodiscard]] int columns_inside(int angle) const noexcept {
+  [[nodiscard]] int columns_inside(int angle) const WASP_REALTIME {
     return forward_.rows[static_cast<std::size_t>(angle)].end;
   }
-  [[nodiscard]] const RemapTable& forward_table() const noexcept { return forward_; }
+  [[nodiscard]] const RemapTable& forward_table() const WASP_REALTIME { return forward_; }
 
   /// Image to map: `map` has angles x radii bytes, densely packed; outside the image it is 0. False (nothing written)
   /// for an image of another size or stride, null `map`, or an empty LogPolarMap. Realtime-safe: yes.
-  bool transform(const GrayView& image, std::uint8_t* map) const noexcept;
+  bool transform(const GrayView& image, std::uint8_t* map) const WASP_REALTIME;
   /// Map to image: `image` has height rows of `stride` >= width. Beyond the map's reach it is 0. Realtime-safe: yes
   /// (not const: it keeps a copy of the map with its first row repeated at the end, where phi wraps).
-  bool inverse(const std::uint8_t* map, std::uint8_t* image, int stride_px) noexcept;
+  bool inverse(const std::uint8_t* map, std::uint8_t* image, int stride_px) WASP_REALTIME;
 
  private:
   void fill_forward();

@@ -187,11 +187,13 @@ bool RemapTable::fits(const GrayView& source) const noexcept {
 
 bool remap(const RemapTable& table, const GrayView& source, std::uint8_t* out, int out_stride) noexcept {
   if (table.fits(source)) prefetch(source);
-  return for_rows(table, source, out, out_stride, HWY_DYNAMIC_DISPATCH(remap_row));
+  return for_rows(table, source, out, out_stride, [](auto... row) noexcept {
+    HWY_DYNAMIC_DISPATCH(remap_row)(row...);
+  });
 }
 
 bool remap_scalar(const RemapTable& table, const GrayView& source, std::uint8_t* out, int out_stride) noexcept {
-  return for_rows(table, source, out, out_stride, &remap_row_scalar);
+  return for_rows(table, source, out, out_stride, [](auto... row) noexcept { remap_row_scalar(row...); });
 }
 
 const char* remap_target() noexcept { return HWY_DYNAMIC_DISPATCH(target_name)(); }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "types/image_view.h"
+#include "types/realtime.h"
 
 namespace wasp::vision {
 
@@ -32,18 +33,18 @@ struct RemapTable {
   /// Sets one output pixel to the source point (x, y), which is clamped to the source. Realtime-safe: no.
   void set(int column, int row, double x_px, double y_px);
   /// Whether `source` is what the table was made for.
-  [[nodiscard]] bool fits(const GrayView& source) const noexcept;
+  [[nodiscard]] bool fits(const GrayView& source) const WASP_REALTIME;
 };
 
 /// Fills `out` (height_px rows of width_px, `out_stride` apart) from `source`. False, and nothing written, when the
 /// source does not fit the table or `out` is null or its stride too short. Time depends on the covered area only.
 /// Realtime-safe: yes.
-bool remap(const RemapTable& table, const GrayView& source, std::uint8_t* out, int out_stride) noexcept;
+bool remap(const RemapTable& table, const GrayView& source, std::uint8_t* out, int out_stride) WASP_REALTIME;
 
 /// The same arithmetic without vectors, for tests: equal to the bit. Realtime-safe: yes.
-bool remap_scalar(const RemapTable& table, const GrayView& source, std::uint8_t* out, int out_stride) noexcept;
+bool remap_scalar(const RemapTable& table, const GrayView& source, std::uint8_t* out, int out_stride) WASP_REALTIME;
 
 /// Name of the instruction set remap() runs with here ("AVX3_ZEN4", "NEON", ...).
-const char* remap_target() noexcept;
+const char* remap_target() WASP_REALTIME;
 
 }  // namespace wasp::vision

@@ -8,17 +8,18 @@
 #include <span>
 
 #include "types/frames.h"
+#include "types/realtime.h"
 
 namespace wasp::vision {
 
 struct InversePlane {
   float a = 0, b = 0, c = 0;  ///< [1/m]
 
-  [[nodiscard]] Vec3 gradient() const noexcept { return {a, b, c}; }
+  [[nodiscard]] Vec3 gradient() const WASP_REALTIME { return {a, b, c}; }
   /// Distance of the camera centre from the plane [m]; infinite for the plane at infinity.
-  [[nodiscard]] float height_m() const noexcept;
+  [[nodiscard]] float height_m() const WASP_REALTIME;
   /// Unit normal in camera axes, pointing to the camera's side: n . X = -height.
-  [[nodiscard]] Vec3 normal_cam() const noexcept;
+  [[nodiscard]] Vec3 normal_cam() const WASP_REALTIME;
 };
 
 /// How far from a plane a sample may lie and still belong to it: k sigma of the sensor, constant in w, plus the
@@ -37,10 +38,12 @@ struct PlaneSupport {
   int inliers = 0;  ///< within tolerance
   int below = 0;    ///< beyond the plane by more than 1.5 tolerances: behind or under it
 };
-PlaneSupport count_support(const InverseDepths& points, const InversePlane& plane, const PlaneTolerance& t) noexcept;
+PlaneSupport count_support(const InverseDepths& points, const InversePlane& plane,
+                           const PlaneTolerance& t) WASP_REALTIME;
 
 /// The plane through three samples; false when their rays are nearly in line (twice the area below `min_area`).
-bool plane_through(const InverseDepths& points, std::array<int, 3> index, float min_area, InversePlane& out) noexcept;
+bool plane_through(const InverseDepths& points, std::array<int, 3> index, float min_area,
+                   InversePlane& out) WASP_REALTIME;
 
 struct PlaneFit {
   bool valid = false;
@@ -54,6 +57,6 @@ struct PlaneFit {
 
 /// Least squares over the samples within tolerance of `start`. Invalid with fewer than 8 of them or when they do not
 /// span two directions.
-PlaneFit fit_inliers(const InverseDepths& points, const InversePlane& start, const PlaneTolerance& t) noexcept;
+PlaneFit fit_inliers(const InverseDepths& points, const InversePlane& start, const PlaneTolerance& t) WASP_REALTIME;
 
 }  // namespace wasp::vision

@@ -4,21 +4,23 @@
 
 #include <cstdint>
 
+#include "types/realtime.h"
+
 namespace wasp::vision {
 
 struct PseudoRandom {
   std::uint32_t state = 0x2545F491u;
 
   /// Next 32 bits. Realtime-safe: yes.
-  constexpr std::uint32_t next() noexcept { return state = state * 1664525u + 1013904223u; }
+  constexpr std::uint32_t next() WASP_REALTIME { return state = state * 1664525u + 1013904223u; }
 
   /// Uniform in 0 ... n-1 (n >= 1; bias below n/65536 for n <= 65536). Realtime-safe: yes.
-  constexpr int below(int n) noexcept {
+  constexpr int below(int n) WASP_REALTIME {
     return static_cast<int>((static_cast<std::uint64_t>(next() >> 8) * static_cast<std::uint64_t>(n)) >> 24);
   }
 
   /// Uniform in [0, 1). Realtime-safe: yes.
-  constexpr float uniform() noexcept { return static_cast<float>(next() >> 8) * 0x1p-24f; }
+  constexpr float uniform() WASP_REALTIME { return static_cast<float>(next() >> 8) * 0x1p-24f; }
 };
 
 }  // namespace wasp::vision

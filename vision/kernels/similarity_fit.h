@@ -7,6 +7,7 @@
 
 #include <cstdint>
 
+#include "types/realtime.h"
 #include "vision/kernels/flow_field.h"
 
 namespace wasp::vision {
@@ -35,6 +36,6 @@ struct SimilarityFit {
 
 /// Invalid for a field of bad shape, too few cells, cells in one spot, or no agreement. Cells that are not finite are
 /// left out. Deterministic. Realtime-safe: yes.
-SimilarityFit fit_similarity(const SimilarityFitParams& params, const FlowField& flow) noexcept;
+SimilarityFit fit_similarity(const SimilarityFitParams& params, const FlowField& flow) WASP_REALTIME;
 
 }  // namespace wasp::vision

@@ -8,6 +8,7 @@
 
 #include <array>
 
+#include "types/realtime.h"
 #include "vision/kernels/flow_field.h"
 #include "vision/kernels/log_polar.h"
 #include "vision/kernels/similarity_fit.h"
@@ -46,28 +47,28 @@ using ContactRings = std::array<ContactRing, kMaxContactRings>;
 /// Rings about (foe_x, foe_y) in the image; the whole is the robustly weighted least squares of r' = r / tau over all
 /// cells. `rings` may be null. Realtime-safe: yes.
 TimeToContact contact_from_rings(const TimeToContactParams& params, const FlowField& flow, float foe_x_px,
-                                 float foe_y_px, ContactRings* rings = nullptr) noexcept;
+                                 float foe_y_px, ContactRings* rings = nullptr) WASP_REALTIME;
 
 /// The same cells as displacements in a log-polar map whose fovea is the focus of expansion; rings are bands of rho,
 /// radius and flow in columns. The displacement is taken whole, rho(second) - rho(first), not its derivative, so large
 /// flow costs nothing. Realtime-safe: yes.
 TimeToContact contact_from_log_polar(const TimeToContactParams& params, const FlowField& flow,
-                                     const LogPolarGeometry& map, ContactRings* rings = nullptr) noexcept;
+                                     const LogPolarGeometry& map, ContactRings* rings = nullptr) WASP_REALTIME;
 
 /// From the growth ln s over `frames` >= 1 frames and its sigma. Realtime-safe: yes.
 TimeToContact contact_from_scale(const TimeToContactParams& params, float log_scale, float log_scale_sigma,
-                                 int frames) noexcept;
+                                 int frames) WASP_REALTIME;
 
 /// Growth over the last `window` frames, from one similarity fit a frame. A frame without a valid fit ends the history:
 /// growth across a gap is unknown.
 class ContactWindow {
  public:
   /// `window` 1 ... kMaxContactWindow (others are brought into range).
-  explicit ContactWindow(int window, const TimeToContactParams& params = {}) noexcept;
+  explicit ContactWindow(int window, const TimeToContactParams& params = {}) WASP_REALTIME;
 
   /// Adds the fit of the newest pair of frames; estimates once `window` fits in a row are there. Realtime-safe: yes.
-  TimeToContact add(const SimilarityFit& fit) noexcept;
-  void reset() noexcept { count_ = 0; }
+  TimeToContact add(const SimilarityFit& fit) WASP_REALTIME;
+  void reset() WASP_REALTIME { count_ = 0; }
 
  private:
   struct Growth {
