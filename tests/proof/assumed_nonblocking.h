@@ -1,0 +1,45 @@
+// Where the proof ends: the functions without a visible body that real-time code may call, each with the reason why it is
+// taken to be nonblocking. Included ahead of every source in the proof (tests/proof/CMakeLists.txt), and nowhere else: a
+// redeclaration gives the compiler the effect, and the flight code needs no wrapper. docs/contract.md explains.
+#pragma once
+
+#include <fftw3.h>
+#include <poll.h>
+#include <sched.h>
+#include <signal.h>
+#include <sys/ioctl.h>
+#include <sys/resource.h>
+#include <time.h>
+#include <unistd.h>
+
+#define WASP_ASSUMED [[clang::nonblocking]]
+
+extern "C" {
+
+// vDSO: reads a page the kernel keeps; no system call on any clock source wasp accepts.
+int clock_gettime(clockid_t, timespec*) noexcept WASP_ASSUMED;
+int sched_getcpu() noexcept WASP_ASSUMED;
+
+// The thread's own address of errno.
+int* __errno_location() noexcept WASP_ASSUMED;
+
+// Waits, which are what a real-time loop is made of: each has a deadline, and is where the loop means to sleep.
+int clock_nanosleep(clockid_t, int, const timespec*, timespec*) WASP_ASSUMED;
+int ppoll(pollfd*, nfds_t, const timespec*, const sigset_t*) WASP_ASSUMED;
+
+// Only SYS_futex is called by it: a wait with a deadline, or a wake. The system-call filter keeps it so at run time.
+long syscall(long, ...) noexcept WASP_ASSUMED;
+
+// The serial line, opened O_NONBLOCK: these return EAGAIN instead of waiting; poll is called with no patience.
+ssize_t read(int, void*, size_t) WASP_ASSUMED;
+ssize_t write(int, const void*, size_t) WASP_ASSUMED;
+int poll(pollfd*, nfds_t, int) WASP_ASSUMED;
+int ioctl(int, unsigned long, ...) noexcept WASP_ASSUMED;
+
+// A system call without waiting: page faults of this thread, once a loop.
+int getrusage(int, rusage*) noexcept WASP_ASSUMED;
+
+// FFTW executes a plan made at start-up in its own buffers; the planner, which allocates and locks, is not in this list.
+void fftwf_execute(const fftwf_plan) WASP_ASSUMED;
+
+}  // extern "C"
