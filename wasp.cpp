@@ -34,6 +34,7 @@ constexpr const char* kUsage =
     "  record   log a running flight, read-only\n"
     "  report   make report.html of a logged flight\n"
     "  eval     run one vision kernel over a folder of recordings\n"
+    "  iceoryx  export topics to iceoryx, or import a camera from it\n"
     "  bench    benchmarks: ipc, vision, micro\n";
 
 int run_sister(const char* name, char** argv) {

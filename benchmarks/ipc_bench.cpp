@@ -20,9 +20,7 @@
 #include "benchmarks/report.h"
 #include "rt/process.h"
 #include "shm/region.h"
-#ifdef WASP_HAVE_ICEORYX
-#include "benchmarks/roudi.h"
-#endif
+#include "tools/roudi_process.h"
 
 namespace wasp::bench {
 namespace {
@@ -134,7 +132,7 @@ int run_ipc(const Options& options) {
 
   std::vector<Contender> contenders{kWasp};
 #ifdef WASP_HAVE_ICEORYX
-  const Roudi roudi;
+  const tools::RoudiProcess roudi({.interrupted = interrupted});
   if (roudi.trouble().empty())
     contenders.push_back(kIceoryx);
   else

@@ -60,10 +60,11 @@ function(wasp_program name)
   install(TARGETS ${name})
 endfunction()
 
-# wasp_test(folder DEPENDS targets... [PROCESSORS n]): tests/<folder>/*_test.cpp as one GoogleTest program, discovered by
-# CTest. PROCESSORS 2 keeps a test that needs the machine to itself from running beside another under ctest -j 2.
+# wasp_test(folder DEPENDS targets... [PROCESSORS n] [LOCK name]): tests/<folder>/*_test.cpp as one GoogleTest program, discovered by
+# CTest. PROCESSORS 2 keeps a test that needs the machine to itself from running beside another under ctest -j 2;
+# tests with the same LOCK never run at the same time.
 function(wasp_test folder)
-  cmake_parse_arguments(ARG "" "PROCESSORS" "DEPENDS" ${ARGN})
+  cmake_parse_arguments(ARG "" "PROCESSORS;LOCK" "DEPENDS" ${ARGN})
   if(NOT ARG_PROCESSORS)
     set(ARG_PROCESSORS 1)
   endif()
@@ -75,5 +76,5 @@ function(wasp_test folder)
   add_executable(${target} ${sources})
   target_link_libraries(${target} PRIVATE ${ARG_DEPENDS} wasp_options GTest::gtest_main)
   target_compile_definitions(${target} PRIVATE WASP_SOURCE_DIR="${CMAKE_SOURCE_DIR}" WASP_BINARY_DIR="${CMAKE_BINARY_DIR}")
-  gtest_discover_tests(${target} TEST_PREFIX "${folder}." DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 900 PROCESSORS ${ARG_PROCESSORS})
+  gtest_discover_tests(${target} TEST_PREFIX "${folder}." DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 900 PROCESSORS ${ARG_PROCESSORS} RESOURCE_LOCK "${ARG_LOCK}")
 endfunction()
