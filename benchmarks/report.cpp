@@ -1,25 +1,9 @@
 #include "benchmarks/report.h"
 
-#include <algorithm>
-#include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
 namespace wasp::bench {
-namespace {
-
-double at(const std::vector<std::int64_t>& sorted, double q) {
-  const auto rank = static_cast<std::size_t>(std::ceil(q * static_cast<double>(sorted.size())));
-  return static_cast<double>(sorted[std::max<std::size_t>(rank, 1) - 1]);
-}
-
-}  // namespace
-
-Quantiles quantiles(std::vector<std::int64_t> samples) {
-  if (samples.empty()) return {};
-  std::sort(samples.begin(), samples.end());
-  return {samples.size(), at(samples, 0.5), at(samples, 0.99), at(samples, 0.999), at(samples, 1)};
-}
 
 void Report::note(const std::string& name, const std::string& text) {
   if (json_)

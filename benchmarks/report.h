@@ -1,4 +1,4 @@
-// Results: quantiles of exact samples, and one line a figure, as a table or as JSON.
+// Results: one line a figure, as a table or as JSON.
 #pragma once
 
 #include <cstdint>
@@ -6,14 +6,12 @@
 #include <string>
 #include <vector>
 
+#include "tools/quantiles.h"
+
 namespace wasp::bench {
 
-/// Exact quantiles of nanosecond samples.
-struct Quantiles {
-  std::size_t count = 0;
-  double p50 = 0, p99 = 0, p999 = 0, max = 0;
-};
-Quantiles quantiles(std::vector<std::int64_t> samples_ns);
+using tools::Quantiles;
+using tools::quantiles;
 
 /// Prints figures as they come and remembers whether every bar was met.
 class Report {

@@ -1,0 +1,83 @@
+#include "tools/doctor_plan.h"
+
+#include <sched.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "drivers/serial_port.h"
+#include "rt/thread.h"
+#include "scheduling/config.h"
+#include "tools/program_paths.h"
+#include "tools/record_attachment.h"
+
+namespace wasp::tools {
+namespace {
+
+std::set<int> cores_of_this_process() {
+  cpu_set_t set;
+  CPU_ZERO(&set);
+  std::set<int> cores;
+  if (sched_getaffinity(0, sizeof set, &set) == 0)
+    for (int c = 0; c < CPU_SETSIZE; ++c)
+      if (CPU_ISSET(c, &set)) cores.insert(c);
+  return cores;
+}
+
+/// Sections of [behaviour] in the files: the doctor need not know the behaviours themselves.
+std::vector<std::string> behaviour_names(const std::vector<std::string>& files) {
+  std::vector<std::string> names;
+  for (const auto& file : files) {
+    const toml::value root = toml::parse(file);
+    if (!root.contains("behaviour")) continue;
+    for (const auto& [name, section] : toml::find(root, "behaviour").as_table())
+      if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+  }
+  return names;
+}
+
+bool any_flight_under_way() {
+  std::error_code ignored;
+  for (const auto& entry : std::filesystem::directory_iterator("/dev/shm", ignored)) {
+    const std::string name = entry.path().filename().string();
+    if (name.starts_with("wasp.") && name.ends_with(".flight") && is_written(name)) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+std::set<int> DoctorPlan::other_cores() const {
+  std::set<int> others;
+  std::set_difference(usable_cores.begin(), usable_cores.end(), flight_cores.begin(), flight_cores.end(),
+                      std::inserter(others, others.end()));
+  return others;
+}
+
+DoctorPlan plan_doctor(const std::string& config, int core, double seconds) {
+  std::vector<std::string> files{(config_folder() / "wasp.toml").string()};
+  if (!config.empty()) files.push_back(config);
+  const scheduling::Config c = scheduling::load_config(files, behaviour_names(files));
+  DoctorPlan plan;
+  plan.usable_cores = cores_of_this_process();
+  plan.seconds = seconds;
+  plan.heap_mib = c.heap_mib;
+  plan.control_deadline_ns = c.control_deadline_ns;
+  plan.control_budget_ns = c.control_thread.budget_ns;
+  plan.tty = drivers::SerialEndpoint::parse(c.endpoint).path;
+  plan.core = rt::nearest_usable_core(core >= 0 ? core : c.control_thread.core);
+  std::vector<scheduling::ThreadRow> rows = c.behaviours;
+  rows.push_back(c.control_thread);
+  rows.push_back(c.link_thread);
+  for (const auto& row : rows) {
+    plan.priorities.insert(row.priority);
+    plan.flight_cores.insert(rt::nearest_usable_core(core >= 0 ? core : row.core));
+  }
+  plan.flight_under_way = any_flight_under_way();
+  return plan;
+}
+
+std::string setcap_command() { return "sudo setcap cap_sys_nice,cap_ipc_lock=ep " + program("wasp"); }
+std::string as_root_command() { return "sudo " + program("wasp") + " doctor"; }
+
+}  // namespace wasp::tools
