@@ -3,6 +3,7 @@
 #include <string_view>
 
 #include "benchmarks/bench.h"
+#include "benchmarks/latency_bench.h"
 
 namespace {
 
@@ -39,6 +40,11 @@ int main(int argc, char** argv) {
       command->add_option("--only", options.only, "only kernels whose name contains this");
     command->callback([&chosen, &row] { chosen = &row; });
   }
+  wasp::bench::LatencyOptions latency;
+  CLI::App* latency_command = app.add_subcommand(
+      "latency", "the flight in the simulator, idle and under load, beside cyclictest; exposure to the last byte");
+  wasp::bench::declare_latency(*latency_command, latency);
   CLI11_PARSE(app, argc, argv);
+  if (latency_command->parsed()) return wasp::bench::run_latency(latency);
   return chosen->run(options);
 }

@@ -48,7 +48,7 @@ Check check_tty(const DoctorPlan& plan) {
   const std::string timer = "/sys/bus/usb-serial/devices/" + name + "/latency_timer";
   const auto timer_ms = plan.tree.number(timer);
   auto flags = flags_from_sysfs(plan.tree, name);
-  if (!flags && plan.tree.real() && !plan.flight_under_way) flags = flags_from_driver(plan.tty);
+  if (!flags && plan.tree.real() && plan.flight_under_way.empty()) flags = flags_from_driver(plan.tty);
   const bool low = flags && (*flags & kLowLatency) != 0;
   c.measured =
       fmt::format("{}: low-latency flag {}", plan.tty, flags ? (low ? "set" : "not set") : "not known to its driver");

@@ -7,7 +7,7 @@
 
 #include "drivers/serial_port.h"
 #include "rt/thread.h"
-#include "scheduling/config.h"
+#include "tools/flight_config.h"
 #include "tools/program_paths.h"
 #include "tools/record_attachment.h"
 
@@ -24,25 +24,14 @@ std::set<int> cores_of_this_process() {
   return cores;
 }
 
-/// Sections of [behaviour] in the files: the doctor need not know the behaviours themselves.
-std::vector<std::string> behaviour_names(const std::vector<std::string>& files) {
-  std::vector<std::string> names;
-  for (const auto& file : files) {
-    const toml::value root = toml::parse(file);
-    if (!root.contains("behaviour")) continue;
-    for (const auto& [name, section] : toml::find(root, "behaviour").as_table())
-      if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
-  }
-  return names;
-}
-
-bool any_flight_under_way() {
+/// Name of a region that a living flight writes, "" if there is none.
+std::string flight_under_way() {
   std::error_code ignored;
   for (const auto& entry : std::filesystem::directory_iterator("/dev/shm", ignored)) {
     const std::string name = entry.path().filename().string();
-    if (name.starts_with("wasp.") && name.ends_with(".flight") && is_written(name)) return true;
+    if (name.starts_with("wasp.") && name.ends_with(".flight") && is_written(name)) return name;
   }
-  return false;
+  return {};
 }
 
 }  // namespace
@@ -55,9 +44,7 @@ std::set<int> DoctorPlan::other_cores() const {
 }
 
 DoctorPlan plan_doctor(const std::string& config, int core, double seconds) {
-  std::vector<std::string> files{(config_folder() / "wasp.toml").string()};
-  if (!config.empty()) files.push_back(config);
-  const scheduling::Config c = scheduling::load_config(files, behaviour_names(files));
+  const scheduling::Config c = read_flight_config(config);
   DoctorPlan plan;
   plan.usable_cores = cores_of_this_process();
   plan.seconds = seconds;
@@ -73,7 +60,7 @@ DoctorPlan plan_doctor(const std::string& config, int core, double seconds) {
     plan.priorities.insert(row.priority);
     plan.flight_cores.insert(rt::nearest_usable_core(core >= 0 ? core : row.core));
   }
-  plan.flight_under_way = any_flight_under_way();
+  plan.flight_under_way = flight_under_way();
   return plan;
 }
 

@@ -18,9 +18,9 @@ struct DoctorPlan {
   std::set<int> priorities;    ///< SCHED_FIFO, of the thread table
   int heap_mib = 64;
   DurationNs control_deadline_ns = 10 * kMillisecond, control_budget_ns = 2 * kMillisecond;
-  std::string tty;                ///< device of the configured endpoint, e.g. "/dev/ttyUSB0"
-  double seconds = 5;             ///< of the wake-up measurement
-  bool flight_under_way = false;  ///< then nothing is done that could disturb it
+  std::string tty;               ///< device of the configured endpoint, e.g. "/dev/ttyUSB0"
+  double seconds = 5;            ///< of the wake-up measurement
+  std::string flight_under_way;  ///< its region, "" if none; then nothing is done that could disturb it
 
   [[nodiscard]] std::set<int> other_cores() const;  ///< usable ones that are not the flight's
 };

@@ -160,7 +160,7 @@ Check check_preemption(const DoctorPlan& plan) {
   c.measured = quoted("/sys/kernel/realtime", claims.sysfs) + quoted("version", claims.version) +
                quoted("config", claims.config) + quoted("debugfs", claims.debugfs) + quoted("log", claims.log);
   bool preempts = claims.full, observed = false;
-  if (plan.tree.real() && !plan.flight_under_way) {
+  if (plan.tree.real() && plan.flight_under_way.empty()) {
     const Behaviour b = observe(plan.core);
     const auto call = static_cast<double>(b.call_ns);
     observed = b.refused.empty() && b.call_ns > 100 * kMicrosecond &&

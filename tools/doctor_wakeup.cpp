@@ -92,8 +92,9 @@ Check judge(const DoctorPlan& plan, int core, const CoreFigures& f, bool fifo, b
 }  // namespace
 
 std::vector<Check> check_wakeups(const DoctorPlan& plan) {
-  if (plan.flight_under_way)
-    return {{"wake-up", State::kUnknown, "not measured: a flight is under way", "run the doctor when it has landed"}};
+  if (!plan.flight_under_way.empty())
+    return {{"wake-up", State::kUnknown, "not measured: a flight is under way (" + plan.flight_under_way + ")",
+             "run the doctor when it has landed"}};
   lock_what_is_mapped();
   const rt::CpuLatencyHold awake;
   int priority = plan.priorities.empty() ? 80 : *plan.priorities.rbegin();

@@ -32,12 +32,6 @@ struct Axes {
   }
 };
 
-std::string decade_text(int decade) {
-  constexpr std::array<const char*, 4> kUnits = {"ns", "us", "ms", "s"};
-  const auto unit = std::min<std::size_t>(static_cast<std::size_t>(decade) / 3, 3);
-  return fmt::format("{:.0f} {}", std::pow(10.0, decade - 3 * static_cast<int>(unit)), kUnits[unit]);
-}
-
 /// Histogram buckets gathered into the bars of the panel.
 std::array<double, kBars> bars_of(const StageSummary& stage, const Axes& axes) {
   std::array<double, kBars> bars{};

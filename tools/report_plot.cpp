@@ -3,8 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <iterator>
+
+#include "tools/report_page.h"
 
 namespace wasp::tools {
 namespace {
@@ -86,18 +89,35 @@ void draw_span_names(const Plot& plot, const Frame& f, Out out) {
   }
 }
 
-void draw_axes(const Plot& plot, const Frame& f, Out out) {
-  const auto xs = nice_ticks(f.x, std::max(3, static_cast<int>((f.x1 - f.x0) / 90)));
-  const auto ys = nice_ticks(f.y, std::max(3, static_cast<int>((f.y1 - f.y0) / 45)));
-  const double x_step = xs.size() > 1 ? xs[1] - xs[0] : 1, y_step = ys.size() > 1 ? ys[1] - ys[0] : 1;
-  for (const double v : ys) {
-    fmt::format_to(out, "<path class='grid' d='M{:.1f} {:.1f}H{:.1f}'/>", f.x0, f.py(v), f.x1);
-    fmt::format_to(out, "<text class='end' x='{:.1f}' y='{:.1f}'>{}</text>", f.x0 - 6, f.py(v) + 4,
-                   tick_text(v, y_step));
+struct Tick {
+  double at;
+  std::string text;
+};
+
+std::vector<Tick> ticks_of(Scale scale, Range range, int wanted) {
+  std::vector<Tick> ticks;
+  if (scale == Scale::kLinear) {
+    const auto values = nice_ticks(range, wanted);
+    const double step = values.size() > 1 ? values[1] - values[0] : 1;
+    for (const double v : values) ticks.push_back({v, tick_text(v, step)});
+    return ticks;
   }
-  for (const double v : xs) {
+  for (int d = static_cast<int>(std::ceil(range.low - 1e-9)); d <= std::floor(range.high + 1e-9); ++d)
+    ticks.push_back(
+        {static_cast<double>(d), scale == Scale::kLog ? fmt::format("{:g}", std::pow(10.0, d)) : decade_text(d)});
+  return ticks;
+}
+
+void draw_axes(const Plot& plot, const Frame& f, Out out) {
+  const auto xs = ticks_of(plot.x_scale, f.x, std::max(3, static_cast<int>((f.x1 - f.x0) / 90)));
+  const auto ys = ticks_of(plot.y_scale, f.y, std::max(3, static_cast<int>((f.y1 - f.y0) / 45)));
+  for (const auto& [v, text] : ys) {
+    fmt::format_to(out, "<path class='grid' d='M{:.1f} {:.1f}H{:.1f}'/>", f.x0, f.py(v), f.x1);
+    fmt::format_to(out, "<text class='end' x='{:.1f}' y='{:.1f}'>{}</text>", f.x0 - 6, f.py(v) + 4, text);
+  }
+  for (const auto& [v, text] : xs) {
     fmt::format_to(out, "<path class='grid' d='M{:.1f} {:.1f}V{:.1f}'/>", f.px(v), f.y0, f.y1);
-    fmt::format_to(out, "<text class='mid' x='{:.1f}' y='{:.1f}'>{}</text>", f.px(v), f.y1 + 16, tick_text(v, x_step));
+    fmt::format_to(out, "<text class='mid' x='{:.1f}' y='{:.1f}'>{}</text>", f.px(v), f.y1 + 16, text);
   }
   fmt::format_to(out, "<path class='axis' d='M{0:.1f} {1:.1f}V{3:.1f}H{2:.1f}'/>", f.x0, f.y0, f.x1, f.y1);
   fmt::format_to(out, "<text class='mid name' x='{:.1f}' y='{}'>{}</text>", 0.5 * (f.x0 + f.x1), plot.height - 6,
@@ -158,6 +178,17 @@ std::string escape_html(std::string_view text) {
       out += c;
   }
   return out;
+}
+
+std::string decade_text(int decade) {
+  constexpr std::array<const char*, 4> kUnits = {"ns", "us", "ms", "s"};
+  const int unit = std::clamp(decade / 3, 0, 3);
+  return fmt::format("{:g} {}", std::pow(10.0, decade - 3 * unit), kUnits[static_cast<std::size_t>(unit)]);
+}
+
+std::string standalone_svg(const std::string& svg) {
+  return "<svg xmlns='http://www.w3.org/2000/svg'" + svg.substr(4, svg.find('>') - 3) + "<style>" + report_style() +
+         "svg{background:var(--card)}</style>" + svg.substr(svg.find('>') + 1) + "\n";
 }
 
 std::string tick_text(double value, double step) {

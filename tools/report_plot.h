@@ -27,12 +27,16 @@ struct Span {
   double from = 0, to = 0;
 };
 
+/// What the numbers of an axis are. A logarithmic axis is given the decimal logarithms of its values.
+enum class Scale { kLinear, kLog, kLogDuration };  ///< kLogDuration: of nanoseconds
+
 struct Plot {
   std::string title;  ///< for screen readers; the page prints its own heading
   std::string x_label, y_label;
   int width = 1100, height = 330;
   bool equal_axes = false;  ///< one metre is as long in x as in y
   double least_y_span = 0;  ///< keeps a flat curve flat
+  Scale x_scale = Scale::kLinear, y_scale = Scale::kLinear;
   std::vector<Span> spans;
   std::vector<Curve> curves;
   struct Mark {
@@ -49,6 +53,10 @@ struct Plot {
 std::string escape_html(std::string_view text);
 /// A tick label: as many decimals as the step needs.
 std::string tick_text(double value, double step);
+/// "10 us" for 4, "1 s" for 9: a decade of nanoseconds.
+std::string decade_text(int decade);
+/// An SVG file of its own: the element with name space and style sheet.
+std::string standalone_svg(const std::string& svg);
 /// Width of a label of the style sheet's size, for spacing [px].
 double text_width(std::string_view text);
 

@@ -1,0 +1,30 @@
+#include "tools/flight_config.h"
+
+#include <algorithm>
+
+#include "tools/program_paths.h"
+
+namespace wasp::tools {
+namespace {
+
+std::vector<std::string> behaviour_names(const std::vector<std::string>& files) {
+  std::vector<std::string> names;
+  for (const auto& file : files) {
+    scheduling::TomlTable::parse_file(file);  // its errors name the file and the line
+    const toml::value root = toml::parse(file);
+    if (!root.contains("behaviour")) continue;
+    for (const auto& [name, section] : toml::find(root, "behaviour").as_table())
+      if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+  }
+  return names;
+}
+
+}  // namespace
+
+scheduling::Config read_flight_config(const std::string& extra) {
+  std::vector<std::string> files{(config_folder() / "wasp.toml").string()};
+  if (!extra.empty()) files.push_back(extra);
+  return scheduling::load_config(files, behaviour_names(files));
+}
+
+}  // namespace wasp::tools
