@@ -22,7 +22,7 @@ std::optional<std::string> find_cyclictest() {
 
 std::vector<std::string> cyclictest_arguments(const std::string& program, const CyclictestSpec& spec) {
   std::string cores;
-  for (const int c : spec.cores) cores += (cores.empty() ? "" : ",") + std::to_string(c);
+  for (const int c : spec.cores) cores += fmt::format("{}{}", cores.empty() ? "" : ",", c);
   const auto loops =
       static_cast<long long>(spec.seconds * static_cast<double>(kSecond) / static_cast<double>(spec.period_ns));
   std::vector<std::string> a{program,

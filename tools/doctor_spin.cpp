@@ -103,7 +103,7 @@ Check check_throttling(const DoctorPlan& plan) {
   Check c{"real-time throttling", State::kOk, "",
           "a real-time thread that is busy for a second is stopped for 50 ms: a whole control period"};
   if (!plan.flight_under_way.empty())
-    return unknown(c, "not tried: a flight is under way (" + plan.flight_under_way + ")", {});
+    return unknown(c, fmt::format("not tried: a flight is under way ({})", plan.flight_under_way), {});
   const SpinFigures f = spin_on(plan.core, false);
   if (!f.refused.empty())
     return unknown(c, "a spinning SCHED_FIFO thread was refused: " + f.refused, {as_root_command()});
@@ -120,7 +120,7 @@ Check check_fair_server(const DoctorPlan& plan) {
   Check c{"fair-server stall", State::kOk, "",
           "an ordinary thread starved by a busy real-time one gets 50 ms a second in its place"};
   if (!plan.flight_under_way.empty())
-    return unknown(c, "not tried: a flight is under way (" + plan.flight_under_way + ")", {});
+    return unknown(c, fmt::format("not tried: a flight is under way ({})", plan.flight_under_way), {});
   const SpinFigures f = spin_on(plan.core, true);
   if (!f.refused.empty())
     return unknown(c, "a spinning SCHED_FIFO thread was refused: " + f.refused, {as_root_command()});

@@ -93,7 +93,7 @@ Check judge(const DoctorPlan& plan, int core, const CoreFigures& f, bool fifo, b
 
 std::vector<Check> check_wakeups(const DoctorPlan& plan) {
   if (!plan.flight_under_way.empty())
-    return {{"wake-up", State::kUnknown, "not measured: a flight is under way (" + plan.flight_under_way + ")",
+    return {{"wake-up", State::kUnknown, fmt::format("not measured: a flight is under way ({})", plan.flight_under_way),
              "run the doctor when it has landed"}};
   lock_what_is_mapped();
   const rt::CpuLatencyHold awake;

@@ -187,8 +187,9 @@ std::string decade_text(int decade) {
 }
 
 std::string standalone_svg(const std::string& svg) {
-  return "<svg xmlns='http://www.w3.org/2000/svg'" + svg.substr(4, svg.find('>') - 3) + "<style>" + report_style() +
-         "svg{background:var(--card)}</style>" + svg.substr(svg.find('>') + 1) + "\n";
+  const std::size_t head = svg.find('>') + 1;
+  return fmt::format("<svg xmlns='http://www.w3.org/2000/svg'{}<style>{}svg{{background:var(--card)}}</style>{}\n",
+                     svg.substr(4, head - 4), report_style(), svg.substr(head));
 }
 
 std::string tick_text(double value, double step) {
