@@ -30,6 +30,7 @@ constexpr const char* kUsage =
     "  fly      fly a mission, in the simulator or on a recording, and write a report\n"
     "  flight   the flying process alone (fly starts it)\n"
     "  sim      the simulator: camera and autopilot as another process\n"
+    "  world    make and look at simulated worlds, VRML97 files\n"
     "  top      live rates, ages and latencies of a running flight, read-only\n"
     "  record   log a running flight, read-only\n"
     "  report   make report.html of a logged flight\n"

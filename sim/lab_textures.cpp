@@ -91,9 +91,13 @@ Texture paint_floor(double edges_per_m, const std::vector<FloorShadow>& shadows,
   });
 }
 
+Texture paint_detail() {
+  return paint(kSmall, [](double u, double v) { return tile_noise(u, v, 32, 11); });
+}
+
 std::vector<Texture> paint_lab_textures(std::uint32_t s) {
   std::vector<Texture> t;
-  t.push_back(paint(kSmall, [s](double u, double v) { return tile_noise(u, v, 32, s + 10); }));
+  t.push_back(paint_detail());
   t.push_back(paint(kSmall, [s](double u, double v) { return 0.78 + 0.16 * tile_noise(u, v, 16, s + 20); }));
   t.push_back(paint(kSmall, [s](double u, double v) { return 0.45 + 0.4 * tile_noise(u * 0.125, v, 64, s + 30); }));
   t.push_back(paint(kSmall, [s](double u, double v) {

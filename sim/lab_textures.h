@@ -36,6 +36,8 @@ struct FloorShadow {
 /// Planks run along y; their borders lie along x as a Poisson process of `edges_per_m`, so that the floor's edge
 /// statistics are those of section 7.2 of the thesis with lambda = edges_per_m.
 Texture paint_floor(double edges_per_m, const std::vector<FloorShadow>& shadows, std::uint32_t seed);
+/// The fine grain that multiplies every texture close up; the renderer expects it as texture 1 of any world.
+Texture paint_detail();
 /// All textures but the floor, in the order of LabTexture after kFloor.
 std::vector<Texture> paint_lab_textures(std::uint32_t seed);
 

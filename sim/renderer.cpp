@@ -152,7 +152,7 @@ void Renderer::render_band(const CameraPose& pose, int first_row, float* luminan
       depth_m[at] = hit ? hits.ray.tfar[i] : 0.f;
       luminance[at] = hit ? shade(world_, world_.surfaces[hits.hit.primID[i]], pose.position_ned_m,
                                   {hits.ray.dir_x[i], hits.ray.dir_y[i], hits.ray.dir_z[i]}, hits.ray.tfar[i], pixel)
-                          : 0.f;
+                          : world_.sky;
     }
   }
 }

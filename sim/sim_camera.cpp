@@ -1,10 +1,20 @@
 #include "sim/sim_camera.h"
 
+#include "sim/vrml_file.h"
+
 namespace wasp::sim {
+namespace {
+
+World world_of(const SimConfig& config) {
+  if (!config.world_file.empty()) return placed_at_start(read_vrml(config.world_file));
+  return make_lab({config.seed, config.floor_edges_per_m, config.cartons});
+}
+
+}  // namespace
 
 SimCamera::SimCamera(const SimConfig& config)
     : geometry_(config.camera),
-      renderer_(make_lab({config.seed, config.floor_edges_per_m, config.cartons}), config.camera.intrinsics),
+      renderer_(world_of(config), config.camera.intrinsics),
       sensor_(config.sensor, config.camera.intrinsics.width_px, config.camera.intrinsics.fx_px, config.seed),
       luminance_(static_cast<std::size_t>(renderer_.width_px()) * Renderer::kBandRows),
       depth_m_(luminance_.size()) {}

@@ -13,7 +13,7 @@ namespace wasp::sim {
 
 class SimCamera {
  public:
-  /// Builds the laboratory; takes about a second.
+  /// Builds the laboratory, which takes about a second, or reads the world file. Throws as read_vrml does.
   explicit SimCamera(const SimConfig& config);
 
   /// Both images of one exposure at a body pose: mono8 and depth uint16 mm (0 = no reading), row-major, no padding,

@@ -24,6 +24,7 @@ struct SimConfig {
   SensorParams sensor;
   double floor_edges_per_m = 3.1;
   int cartons = 9;
+  std::string world_file;  ///< VRML97 to fly in instead of the laboratory; empty: the laboratory
 
   /// The Kinect of the thesis: 640 x 480, f = 525 px, pitched down by 30 degrees, 5 cm ahead of the centre of mass.
   SimConfig();

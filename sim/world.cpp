@@ -7,14 +7,14 @@ namespace {
 
 constexpr float kAmbient = 0.62f, kDiffuse = 0.38f;
 
+}  // namespace
+
 /// Light from the ceiling, a little from the left and behind, so that the faces of a box differ.
-float lit(const Vec3& normal) {
+float World::lit(const Vec3& normal) {
   const Vec3 to_lamp = Vec3(-0.45f, -0.35f, -0.82f).normalized();
   return kAmbient + kDiffuse * std::fmax(0.f, normal.dot(to_lamp)) + 0.12f * normal.x() * normal.y() -
          0.06f * std::fabs(normal.y());
 }
-
-}  // namespace
 
 void World::add_quad(const Vec3& corner, const Vec3& edge_u, const Vec3& edge_v, const Material& m) {
   const auto first = static_cast<std::uint32_t>(vertices_ned_m.size());

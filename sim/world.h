@@ -35,9 +35,12 @@ struct World {
   std::vector<std::array<std::uint32_t, 4>> quads;
   std::vector<Surface> surfaces;  ///< one for each quad
   std::vector<Texture> textures;
+  float sky = 0;  ///< pixel value where nothing is hit
 
   /// A parallelogram with one corner and two edges; its normal is edge_u x edge_v, light falls on both sides alike.
   void add_quad(const Vec3& corner, const Vec3& edge_u, const Vec3& edge_v, const Material& material);
+  /// Share of the lamp's and the ambient light on a surface with this normal.
+  static float lit(const Vec3& normal);
   /// A box standing on `base` (centre of its underside, NED), turned by `yaw_rad`; the underside is included.
   void add_box(const Vec3& base, const Vec3& size_m, float yaw_rad, const Material& material);
 };

@@ -39,6 +39,9 @@ std::optional<int> parse_fly_options(int argc, char** argv, FlyOptions& o) {
   app.add_option("--config", o.config, "TOML file whose keys override the defaults")->check(CLI::ExistingFile);
   app.add_option("--name", o.name, "name of the run and its folder (default: mission and time)");
   app.add_option("--out", o.out, "parent folder");
+  app.add_option("--world", o.world, "VRML97 file to fly in (`wasp world make` makes one); default: the laboratory")
+      ->check(CLI::ExistingFile)
+      ->excludes("--replay");
   app.add_option("--seed", o.seed, "seed of the simulated world and noise");
   app.add_flag("--no-rt", o.no_rt, "do not ask for real time; every figure is marked 'not real time'");
   app.add_flag("--enforce", o.enforce, "refuse to fly unless real time is granted")->excludes("--no-rt");

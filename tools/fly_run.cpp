@@ -163,6 +163,7 @@ std::vector<std::string> sim_arguments(const Run& run) {
                              (run.folder / "tty").string(),
                              "--seed",
                              std::to_string(run.options.seed)};
+  if (!run.options.world.empty()) a.insert(a.end(), {"--world", run.options.world});
   if (!run.options.replay.empty()) a.push_back("--no-camera");
   if (!run.options.safety_pilot) a.push_back("--no-safety-pilot");
   return a;

@@ -1,0 +1,70 @@
+// Textures of the generated scenes. "Natural" has the amplitude spectrum of natural images, about 1 / f: each octave of
+// noise has the weight of its wavelength.
+#include <algorithm>
+#include <cmath>
+
+#include "sim/lab_textures.h"
+#include "sim/random.h"
+#include "sim/scene_generators.h"
+
+namespace wasp::sim {
+namespace {
+
+constexpr int kSide = 256, kNaturalSide = 512;
+
+Texture paint(int size_px, const auto& shade) {
+  return Texture(size_px, [&](int u, int v) { return shade((u + 0.5) / size_px, (v + 0.5) / size_px); });
+}
+
+double natural(double u, double v, std::uint32_t seed) {
+  double sum = 0;
+  for (int octave = 0; octave < 5; ++octave)
+    sum += (tile_noise(u, v, 4 << octave, seed + static_cast<std::uint32_t>(10 * octave)) - 0.5) / (1 << octave);
+  return std::clamp(0.5 + 1.1 * sum, 0.02, 0.98);
+}
+
+/// Four by four windows; some are lit.
+double facade(double u, double v, std::uint32_t seed) {
+  const double x = u * 4 - std::floor(u * 4), y = v * 4 - std::floor(v * 4);
+  const auto window = static_cast<std::uint32_t>(u * 4) + 4 * static_cast<std::uint32_t>(v * 4);
+  const bool glass = x > 0.22 && x < 0.78 && y > 0.25 && y < 0.85;
+  if (glass) return 0.10 + 0.45 * static_cast<double>(uniform_of(mix(seed, window)));
+  return 0.62 + 0.2 * (tile_noise(u, v, 32, seed + 3) - 0.5);
+}
+
+/// One sheet in four has a dark heading.
+double notices(double u, double v, std::uint32_t seed) {
+  const auto sheet = static_cast<std::uint32_t>(u * 4) + 4 * static_cast<std::uint32_t>(v * 4);
+  const double x = u * 4 - std::floor(u * 4), y = v * 4 - std::floor(v * 4);
+  const double tone = 0.55 + 0.45 * static_cast<double>(uniform_of(mix(seed, sheet)));
+  if (std::min({x, y, 1 - x, 1 - y}) < 0.09) return 0.42;
+  if (y < 0.3 && mix(seed + 1, sheet) % 4 == 0) return 0.15;
+  const auto line = static_cast<std::uint32_t>(y * 16);
+  return line % 2 == 0 && x < 0.5 + 0.4 * static_cast<double>(uniform_of(mix(seed + 2, sheet * 16 + line)))
+             ? tone - 0.35
+             : tone;
+}
+
+}  // namespace
+
+World empty_world(std::uint32_t seed) {
+  World w;
+  const std::uint32_t s = seed * 1000;
+  w.textures.push_back(Texture(1, [](int, int) { return 1.0; }));
+  w.textures.push_back(paint_detail());
+  w.textures.push_back(paint(kNaturalSide, [s](double u, double v) { return natural(u, v, s + 1); }));
+  w.textures.push_back(paint(kSide, [s](double u, double v) { return facade(u, v, s + 200); }));
+  w.textures.push_back(paint(kSide, [s](double u, double v) { return 0.15 + 0.7 * natural(u, v, s + 300); }));
+  w.textures.push_back(paint(kSide, [s](double u, double v) { return 0.35 + 0.5 * natural(u, v, s + 400); }));
+  w.textures.push_back(paint(kSide, [s](double u, double v) {
+    const bool panel = std::abs(u - 0.5) < 0.32 && (std::abs(v - 0.27) < 0.18 || std::abs(v - 0.72) < 0.2);
+    return (panel ? 0.30 : 0.42) + 0.12 * (tile_noise(u * 0.25, v, 64, s + 500) - 0.5);
+  }));
+  w.textures.push_back(paint(kSide, [s](double u, double v) { return notices(u, v, s + 600); }));
+  w.textures.push_back(paint(kSide, [s](double u, double v) {
+    return (std::abs(u - 0.5) < 0.06 ? 0.75 : 0.5) + 0.25 * (natural(u, v, s + 700) - 0.5);
+  }));
+  return w;
+}
+
+}  // namespace wasp::sim

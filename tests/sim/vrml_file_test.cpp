@@ -1,0 +1,146 @@
+#include "sim/vrml_file.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <fstream>
+
+#include "sim/renderer.h"
+
+namespace wasp::sim {
+namespace {
+
+namespace fs = std::filesystem;
+
+class VrmlFile : public testing::Test {
+ protected:
+  VrmlFile() : folder_(fs::temp_directory_path() / ("wasp-vrml-" + std::to_string(getpid()))) {
+    fs::create_directories(folder_);
+  }
+  ~VrmlFile() override { fs::remove_all(folder_); }
+
+  fs::path text(const std::string& name, const std::string& content) {
+    std::ofstream(folder_ / name) << content;
+    return folder_ / name;
+  }
+  /// The message of the error that reading gives.
+  static std::string error_of(const fs::path& file) {
+    try {
+      read_vrml(file);
+    } catch (const std::runtime_error& e) {
+      return e.what();
+    }
+    return "";
+  }
+  fs::path folder_;
+};
+
+struct Picture {
+  std::vector<float> luminance, depth_m;
+};
+
+/// What a camera at the start, 1.1 m up and pitched down by 20 degrees, sees.
+Picture picture_of(const Scene& scene) {
+  const Intrinsics k{.width_px = 160, .height_px = 120, .fx_px = 120, .fy_px = 120, .cx_px = 79.5f, .cy_px = 59.5f};
+  const Renderer renderer(placed_at_start(scene), k);
+  Picture picture{std::vector<float>(160 * 120), std::vector<float>(160 * 120)};
+  for (int row = 0; row < 120; row += Renderer::kBandRows)
+    renderer.render_band({Vec3(0, 0, -1.1f), R_body_cam_from_pitch_down(Radians{0.35})}, row,
+                         picture.luminance.data() + row * 160, picture.depth_m.data() + row * 160);
+  return picture;
+}
+
+class EveryKind : public VrmlFile, public testing::WithParamInterface<SceneKind> {};
+
+TEST_P(EveryKind, LooksTheSameAfterWritingAndReading) {
+  Scene scene = GetParam().make(3);
+  scene.start_yaw_rad = 0.3f;
+  write_vrml(scene, folder_ / "world.wrl");
+  const Scene again = read_vrml(folder_ / "world.wrl");
+  EXPECT_EQ(again.title, scene.title);
+  EXPECT_NEAR(again.start_yaw_rad, 0.3f, 1e-5f);
+  EXPECT_LT((again.start_ned_m - scene.start_ned_m).norm(), 1e-5f);
+  EXPECT_NEAR(static_cast<double>(again.world.quads.size()), static_cast<double>(scene.world.quads.size()),
+              0.02 * static_cast<double>(scene.world.quads.size())) << "quads come back as quads, but for slivers";
+  const Picture before = picture_of(scene), after = picture_of(again);
+  int different = 0, seen = 0;
+  for (std::size_t i = 0; i < before.depth_m.size(); ++i) {
+    seen += before.depth_m[i] > 0 ? 1 : 0;
+    const bool same = std::abs(before.depth_m[i] - after.depth_m[i]) < 1e-3f * (1 + before.depth_m[i]) &&
+                      std::abs(before.luminance[i] - after.luminance[i]) < 3.f;
+    different += same ? 0 : 1;
+  }
+  EXPECT_GT(seen, 8000) << "of 19200 pixels: the start looks at something";
+  EXPECT_LT(different, 60) << "edges, where a rounding error decides what is hit";
+}
+
+TEST_P(EveryKind, SeedDecidesAndNothingStandsWhereTheFlightBegins) {
+  const Picture one = picture_of(GetParam().make(1)), other = picture_of(GetParam().make(2));
+  if (std::string(GetParam().name) != "arena") {
+    EXPECT_NE(one.luminance, other.luminance);
+  }
+  for (const float depth : other.depth_m) EXPECT_TRUE(depth == 0.f || depth > 0.7f);
+}
+
+TEST_F(VrmlFile, TheSameSeedMakesTheSameScene) {
+  EXPECT_EQ(picture_of(make_scene("city", 7)).luminance, picture_of(make_scene("city", 7)).luminance);
+}
+
+INSTANTIATE_TEST_SUITE_P(Kinds, EveryKind, testing::ValuesIn(scene_kinds().begin(), scene_kinds().end()),
+                         [](const auto& kind) {
+                           std::string name = kind.param.name;
+                           std::erase(name, '-');
+                           return name;
+                         });
+
+constexpr char kHead[] = "#VRML V2.0 utf8\n";
+
+TEST_F(VrmlFile, ForeignFilesArePlacedLitAndTextured) {
+  const auto file = text("a.wrl", std::string(kHead) + R"(
+    Viewpoint { position 0 0 5 orientation 0 1 0 0 }
+    Transform { translation 1 2 3 children Shape {
+      appearance Appearance { material Material { diffuseColor .5 .5 .5 }
+        texture PixelTexture { image 2 1 1 0x00 0xff } }
+      geometry Box { size 2 2 2 } } })");
+  const Scene scene = read_vrml(file);
+  EXPECT_EQ(scene.world.quads.size(), 6u);
+  Vec3 low = scene.world.vertices_ned_m.front(), high = low;
+  for (const Vec3& v : scene.world.vertices_ned_m) low = low.cwiseMin(v), high = high.cwiseMax(v);
+  EXPECT_LT((low - Vec3(-4, 0, -3)).norm(), 1e-5f);  // north = -z, east = x, down = -y
+  EXPECT_LT((high - Vec3(-2, 2, -1)).norm(), 1e-5f);
+  EXPECT_LT((scene.start_ned_m - Vec3(-5, 0, 0)).norm(), 1e-5f);
+  for (const Surface& s : scene.world.surfaces) EXPECT_NEAR(s.brightness, 0.5f * World::lit(s.normal), 1e-5f);
+  EXPECT_EQ(scene.world.textures[static_cast<std::size_t>(scene.world.surfaces[0].texture)].size_px(), 2);
+}
+
+TEST_F(VrmlFile, WhatIsNoWorldIsSaidByFileAndReason) {
+  EXPECT_NE(error_of(folder_ / "absent.wrl").find("absent.wrl: cannot be read"), std::string::npos);
+  EXPECT_NE(error_of(text("b.wrl", "#VRML V1.0 ascii\nCube {}\n")).find("b.wrl:1: not VRML97"), std::string::npos);
+  EXPECT_NE(error_of(text("c.wrl", "")).find("c.wrl"), std::string::npos);
+  EXPECT_NE(error_of(text("d.wrl", kHead)).find("d.wrl: no geometry"), std::string::npos);
+  const std::string broken = error_of(text("e.wrl", std::string(kHead) + "\nShape {\n geometry Bx { }\n}\n"));
+  EXPECT_NE(broken.find("e.wrl"), std::string::npos);
+  EXPECT_NE(broken.find("line"), std::string::npos) << broken;
+  const auto face = [](const char* corner) {
+    return std::string(kHead) + "Shape { geometry IndexedFaceSet { coord Coordinate { point [ 0 0 0, 1 0 0, " + corner +
+           " ] } coordIndex [ 0, 1, 2, -1 ] } }\n";
+  };
+  EXPECT_NE(error_of(text("f.wrl", face("1e9 1 0"))).find("not finite or beyond"), std::string::npos);
+  EXPECT_FALSE(error_of(text("g.wrl", face("nan 1 0"))).empty());
+  EXPECT_EQ(error_of(text("h.wrl", face("1 1 0"))), "");
+  const auto textured = text("i.wrl", std::string(kHead) +
+                                          "Shape { appearance Appearance { texture ImageTexture { url \"gone.png\" } } "
+                                          "geometry Box { } }\n");
+  EXPECT_NE(error_of(textured).find("gone.png"), std::string::npos);
+}
+
+TEST_F(VrmlFile, AFileThatCannotBeWrittenLeavesNothing) {
+  EXPECT_THROW(write_vrml(make_scene("ground", 1), folder_ / "no" / "such" / "folder.wrl"), std::runtime_error);
+  EXPECT_THROW(write_vrml(Scene{}, folder_ / "empty.wrl"), std::runtime_error);
+  EXPECT_TRUE(fs::is_empty(folder_));
+  EXPECT_THROW(make_scene("moon", 1), std::runtime_error);
+}
+
+}  // namespace
+}  // namespace wasp::sim
