@@ -10,12 +10,13 @@ namespace {
 
 constexpr int kPreviewCount = 256;
 constexpr int kGravityDraws = 32;  // one-point candidates with the normal straight up
-/// Three-point draws, and how many of them at most reach the preview. Last frame's plane spares most of them while it
-/// keeps its support; the rest suffice to leave a plane it should not have settled on within a few frames.
-struct Draws {
-  int tried, scored;
-};
-constexpr Draws kColdDraws{512, 112}, kWarmDraws{128, 32};
+constexpr int kBatch = 64;         // three-point draws between two looks at whether they suffice
+constexpr int kMaxBatches = 8, kMostScored = 112;
+/// Enough batches for a plane of this share: a better one would have a larger share and have been drawn as well.
+constexpr std::array kEnoughShare = {2.f, 0.5f, 0.4f, 0.2f, 0.2f, 0.2f, 0.2f, 0.f};
+/// Last frame's plane spares the draws while it keeps its support and nothing lies below it; one batch remains, to
+/// leave within a few frames a plane it should not have settled on.
+constexpr float kHeldBelow = 0.01f;
 constexpr int kRounds = 3;  // of drawing and fitting, until something passes the gates
 constexpr int kKept = 4;
 constexpr int kPolishPasses = 4;
@@ -35,7 +36,7 @@ struct Candidate {
 /// Everything one frame needs, gathered once.
 struct Frame {
   DepthSamples samples;
-  alignas(32) std::array<float, kPreviewCount> x, y, w;  ///< every n-th sample, padded with points far above
+  alignas(64) std::array<float, kPreviewCount> x, y, w;  ///< every n-th sample, padded with points far above
 
   [[nodiscard]] InverseDepths all() const noexcept {
     const auto n = static_cast<std::size_t>(samples.count);
@@ -67,9 +68,10 @@ void fill_preview(Frame& frame) noexcept {
 int score(const PlaneSupport& support) noexcept { return support.inliers - kBelowPenalty * support.below; }
 
 bool plausible(const Search& search, const InversePlane& plane) noexcept {
-  const float height_m = plane.height_m();
-  return height_m > kMinHeight_m && height_m < kMaxHeight_m &&
-         plane.normal_cam().dot(search.prior.up_cam) > search.cos_max_angle;
+  const Vec3 gradient = plane.gradient();  // -n / h
+  const float norm = gradient.norm();
+  return norm * kMinHeight_m < 1.f && norm * kMaxHeight_m > 1.f &&
+         -gradient.dot(search.prior.up_cam) > search.cos_max_angle * norm;
 }
 
 /// Closer than about 6 degrees and 10 % of height: the fit will bring both to the same place.
@@ -98,62 +100,112 @@ bool consider(Search& search, const InversePlane& plane) noexcept {
   return true;
 }
 
-/// How far a sample lies above the camera, along the prior's up.
-float rise_m(const Search& search, int index) noexcept {
+/// Rise of a sample's ray above the camera, along the prior's up, for each metre of depth.
+float slope_up(const Search& search, int index) noexcept {
   const auto i = static_cast<std::size_t>(index);
   const DepthSamples& s = search.frame.samples;
   const Vec3& up = search.prior.up_cam;
-  return (up.x() * s.x[i] + up.y() * s.y[i] + up.z()) / s.w[i];
+  return up.x() * s.x[i] + up.y() * s.y[i] + up.z();
 }
+
+float w_of(const Search& search, int index) noexcept { return search.frame.samples.w[static_cast<std::size_t>(index)]; }
 
 /// The plane with normal `up` through sample i: n . X = -h, w = -(n . ray) / h, h = -(n . ray) / w.
 void consider_gravity(Search& search, PseudoRandom& random) noexcept {
-  const float height_m = -rise_m(search, random.below(search.frame.samples.count));
+  const int index = random.below(search.frame.samples.count);
+  const float height_m = -slope_up(search, index) / w_of(search, index);
   if (!(height_m > kMinHeight_m)) return;
   const Vec3 gradient = -search.prior.up_cam / height_m;
   consider(search, {gradient.x(), gradient.y(), gradient.z()});
-}
-
-/// A valid sample at most `reach` cells from the cell of sample `centre`, or -1.
-int draw_near(const DepthSamples& s, int centre, int reach, PseudoRandom& random) noexcept {
-  const int cell = s.cell[static_cast<std::size_t>(centre)];
-  const int column = cell % kSampleColumns + random.below(2 * reach + 1) - reach;
-  const int row = cell / kSampleColumns + random.below(2 * reach + 1) - reach;
-  if (column < 0 || column >= kSampleColumns || row < 0 || row >= kSampleRows) return -1;
-  return s.of_cell[static_cast<std::size_t>(row * kSampleColumns + column)];
 }
 
 /// The lower of two random samples, going by the prior's up: floors are found at the bottom of things.
 int draw_low(const Search& search, PseudoRandom& random) noexcept {
   const DepthSamples& s = search.frame.samples;
   const int first = random.below(s.count), second = random.below(s.count);
-  return rise_m(search, first) < rise_m(search, second) ? first : second;
+  const bool first_is_lower =
+      slope_up(search, first) * w_of(search, second) < slope_up(search, second) * w_of(search, first);
+  return first_is_lower ? first : second;
 }
 
-bool consider_triple(Search& search, int reach, PseudoRandom& random) noexcept {
+struct Triples {
+  std::array<std::array<std::int16_t, 3>, kBatch> sample;
+  int count = 0;
+};
+
+/// The sample of a cell at most `reach` cells from `cell`, or -1. No branches: which way they go would be a guess.
+int draw_near(const DepthSamples& s, int cell, int reach, PseudoRandom& random) noexcept {
+  const int column = cell % kSampleColumns + random.below(2 * reach + 1) - reach;
+  const int row = cell / kSampleColumns + random.below(2 * reach + 1) - reach;
+  const int inside = static_cast<int>(static_cast<unsigned>(column) < static_cast<unsigned>(kSampleColumns)) &
+                     static_cast<int>(static_cast<unsigned>(row) < static_cast<unsigned>(kSampleRows));
+  return (s.of_cell[static_cast<std::size_t>(-inside & (row * kSampleColumns + column))] | (inside - 1));
+}
+
+Triples draw_triples(const Search& search, PseudoRandom& random) noexcept {
   const DepthSamples& s = search.frame.samples;
-  const int first = draw_low(search, random);
-  const int second = draw_near(s, first, reach, random), third = draw_near(s, first, reach, random);
-  InversePlane plane;
-  return second >= 0 && third >= 0 &&
-         plane_through(search.frame.all(), {first, second, third}, kMinTripleArea, plane) && consider(search, plane);
+  Triples triples;
+  for (std::size_t draw = 0; draw < kBatch; ++draw) {
+    const int first = draw_low(search, random), cell = s.cell[static_cast<std::size_t>(first)];
+    const int reach = kReachCells[draw % kReachCells.size()];
+    const int second = draw_near(s, cell, reach, random), third = draw_near(s, cell, reach, random);
+    triples.sample[static_cast<std::size_t>(triples.count)] = {
+        static_cast<std::int16_t>(first), static_cast<std::int16_t>(second), static_cast<std::int16_t>(third)};
+    triples.count += static_cast<int>((second | third) >= 0);
+  }
+  return triples;
 }
 
-/// Whether last frame's plane is still there (and not just still conceivable, as after a cut).
-bool still_there(const Search& search, const DepthPlaneState& state) noexcept {
-  const int seen = std::min(search.frame.samples.count, kPreviewCount);
-  return static_cast<float>(preview_score(search, state.last)) >=
-         kWarmSupport * state.last_share * static_cast<float>(seen);
+/// Scores the planes through one batch of triples; returns how many there were.
+int consider_triples(Search& search, PseudoRandom& random) noexcept {
+  const Triples triples = draw_triples(search, random);
+  const InverseDepths all = search.frame.all();
+  std::array<InversePlane, kBatch + 1> planes;
+  int count = 0;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(triples.count); ++i) {
+    const auto& t = triples.sample[i];
+    InversePlane& plane = planes[static_cast<std::size_t>(count)];
+    const bool spans = plane_through(all, {t[0], t[1], t[2]}, kMinTripleArea, plane);
+    count += static_cast<int>(spans) & static_cast<int>(plausible(search, plane));
+  }
+  for (int i = 0; i < count; ++i) {
+    const InversePlane& plane = planes[static_cast<std::size_t>(i)];
+    keep(search, {plane, preview_score(search, plane)});
+  }
+  return count;
 }
 
-void draw_candidates(Search& search, DepthPlaneState& state) noexcept {
-  const bool warm = state.warm && consider(search, state.last) && still_there(search, state);
+/// How much of last frame's plane is left: still there (and not just still conceivable, as after a cut), or even held,
+/// with nothing below it, so that no other plane can be the floor.
+enum class Last { kGone, kThere, kHeld };
+
+Last consider_last(Search& search, const DepthPlaneState& state) noexcept {
+  if (!state.warm || !plausible(search, state.last)) return Last::kGone;
+  const PlaneSupport support = count_support(search.frame.preview(), state.last, search.tolerance);
+  keep(search, {state.last, score(support)});
+  const auto seen = static_cast<float>(std::min(search.frame.samples.count, kPreviewCount));
+  if (static_cast<float>(score(support)) < kWarmSupport * state.last_share * seen) return Last::kGone;
+  return static_cast<float>(support.below) <= kHeldBelow * seen ? Last::kHeld : Last::kThere;
+}
+
+int best_score(const Search& search) noexcept {
+  int best = 0;
+  for (const Candidate& c : search.kept) best = std::max(best, c.score);
+  return best;
+}
+
+/// `thorough`: all the draws, because what an earlier round stopped for did not pass the gates.
+void draw_candidates(Search& search, DepthPlaneState& state, bool thorough) noexcept {
+  const Last last = consider_last(search, state);
   if (search.prior.measured)
     for (int i = 0; i < kGravityDraws; ++i) consider_gravity(search, state.random);
-  const Draws draws = warm ? kWarmDraws : kColdDraws;
-  for (int draw = 0, scored = 0; draw < draws.tried && scored < draws.scored; ++draw)
-    scored +=
-        consider_triple(search, kReachCells[static_cast<std::size_t>(draw) % kReachCells.size()], state.random) ? 1 : 0;
+  const auto seen = static_cast<float>(std::min(search.frame.samples.count, kPreviewCount));
+  const int batches = last == Last::kHeld ? 1 : last == Last::kThere ? 2 : kMaxBatches;
+  for (int batch = 0, scored = 0; batch < batches && scored < kMostScored; ++batch) {
+    scored += consider_triples(search, state.random);
+    const float enough = kEnoughShare[static_cast<std::size_t>(batch)] * seen;
+    if (!thorough && static_cast<float>(best_score(search)) >= enough) break;
+  }
 }
 
 PlaneTolerance widened(const PlaneTolerance& t, float factor) noexcept {
@@ -164,12 +216,14 @@ PlaneTolerance widened(const PlaneTolerance& t, float factor) noexcept {
 Candidate best_fitted(const Search& search) noexcept {
   Candidate best;
   const InverseDepths all = search.frame.all();
+  const int worth_it = std::max(best_score(search), 0) / 2;
   for (const Candidate& candidate : search.kept) {
-    if (candidate.score == Candidate{}.score) continue;
-    PlaneFit fit = fit_inliers(all, candidate.plane, widened(search.tolerance, kFirstFit));
-    if (fit.valid) fit = fit_inliers(all, fit.plane, search.tolerance);
-    if (!fit.valid || !plausible(search, fit.plane)) continue;
-    const Candidate fitted{fit.plane, score(count_support(all, fit.plane, search.tolerance))};
+    if (candidate.score == Candidate{}.score || candidate.score < worth_it) continue;
+    InversePlane plane = candidate.plane;
+    if (!refine(all, widened(search.tolerance, kFirstFit), plane) || !refine(all, search.tolerance, plane) ||
+        !plausible(search, plane))
+      continue;
+    const Candidate fitted{plane, score(count_support(all, plane, search.tolerance))};
     if (fitted.score > best.score) best = fitted;
   }
   return best;
@@ -195,9 +249,10 @@ bool passes(const DepthPlaneParams& params, const PlaneEstimate& e, const PlaneS
 }
 
 PlaneEstimate polish(const DepthPlaneParams& params, const Search& search, const InversePlane& start) noexcept {
-  PlaneFit fit{.valid = true, .plane = start};
-  for (int pass = 0; pass < kPolishPasses && fit.valid; ++pass)
-    fit = fit_inliers(search.frame.all(), fit.plane, search.tolerance);
+  InversePlane plane = start;
+  for (int pass = 0; pass + 1 < kPolishPasses; ++pass)
+    if (!refine(search.frame.all(), search.tolerance, plane)) return {};
+  const PlaneFit fit = fit_inliers(search.frame.all(), plane, search.tolerance);
   if (!fit.valid || !plausible(search, fit.plane)) return {};
   const PlaneSupport support = count_support(search.frame.all(), fit.plane, search.tolerance);
   PlaneEstimate estimate = describe(fit, support, search.frame.samples.count);
@@ -231,7 +286,7 @@ PlaneEstimate estimate_floor(const DepthPlaneParams& params, const Intrinsics& i
   Search search{frame, prior, {kSigmas * params.sensor_sigma_per_m, params.flatness_m}, std::cos(prior.max_angle_rad)};
   PlaneEstimate estimate;
   for (int round = 0; round < kRounds && !estimate.valid; ++round) {
-    draw_candidates(search, state);
+    draw_candidates(search, state, round > 0);
     const Candidate best = best_fitted(search);
     if (best.score != Candidate{}.score) estimate = polish(params, search, best.plane);
     state.warm = false;  // another round starts from nothing

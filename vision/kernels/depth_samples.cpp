@@ -1,4 +1,4 @@
-// Table once, gather per frame without branches on the data: write every sample, advance only past valid ones.
+// Table once; per frame fetch all pixels first, so that their cache misses overlap, then pack the valid ones.
 #include "vision/kernels/depth_samples.h"
 
 #include <algorithm>
@@ -6,6 +6,7 @@
 #include <cstring>
 
 #include "vision/kernels/camera_model.h"
+#include "vision/kernels/plane_passes.h"
 
 namespace wasp::vision {
 namespace {
@@ -41,7 +42,8 @@ bool prepare(SampleTable& table, const Intrinsics& k) noexcept {
     table.u_px[i] = place(cell % kSampleColumns, kSampleColumns, k.width_px, hash & 0xffffu);
     table.v_px[i] = place(cell / kSampleColumns, kSampleRows, k.height_px, hash >> 16);
     Ray ray;
-    table.seen[i] = unproject(k, {static_cast<float>(table.u_px[i]), static_cast<float>(table.v_px[i])}, ray);
+    const bool seen = unproject(k, {static_cast<float>(table.u_px[i]), static_cast<float>(table.v_px[i])}, ray);
+    table.seen[i] = seen ? 0xffff : 0;
     table.x[i] = ray.x;
     table.y[i] = ray.y;
   }
@@ -52,19 +54,12 @@ bool prepare(SampleTable& table, const Intrinsics& k) noexcept {
 void gather(const SampleTable& table, const DepthView& depth, const DepthRange& range, DepthSamples& out) noexcept {
   const auto min_mm = static_cast<int>(std::clamp(range.min_m * 1000.f, 1.f, 65534.f));
   const auto max_mm = static_cast<int>(std::clamp(range.max_m * 1000.f, 1.f, 65534.f));
-  int n = 0;
-  for (std::size_t i = 0; i < kSampleCount; ++i) {
-    const int mm = depth.row(table.v_px[i])[table.u_px[i]];
-    const bool valid = mm >= min_mm && mm <= max_mm && table.seen[i] != 0;
-    const auto slot = static_cast<std::size_t>(n);
-    out.x[slot] = table.x[i];
-    out.y[slot] = table.y[i];
-    out.w[slot] = 1000.f / static_cast<float>(std::max(mm, 1));
-    out.cell[slot] = static_cast<std::int16_t>(i);
-    out.of_cell[i] = valid ? static_cast<std::int16_t>(n) : std::int16_t{-1};
-    n += valid ? 1 : 0;
-  }
-  out.count = n;
+  alignas(64) std::array<std::uint16_t, kSampleCount> mm;
+  for (std::size_t i = 0; i < kSampleCount; ++i) mm[i] = depth.row(table.v_px[i])[table.u_px[i]] & table.seen[i];
+  pass_pack(table, mm.data(), min_mm, max_mm, out);
+  out.of_cell.fill(-1);
+  for (std::size_t i = 0; i < static_cast<std::size_t>(out.count); ++i)
+    out.of_cell[static_cast<std::size_t>(out.cell[i])] = static_cast<std::int16_t>(i);
 }
 
 }  // namespace wasp::vision

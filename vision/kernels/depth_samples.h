@@ -20,17 +20,18 @@ inline constexpr int kMinImageSide = 16;  ///< smaller images are refused
 struct SampleTable {
   Intrinsics intrinsics{.width_px = 0, .height_px = 0};  ///< key
   std::array<std::uint16_t, kSampleCount> u_px{}, v_px{};
-  std::array<float, kSampleCount> x{}, y{};       ///< undistorted ray
-  std::array<std::uint8_t, kSampleCount> seen{};  ///< 0: the lens model has no ray here
+  std::array<float, kSampleCount> x{}, y{};        ///< undistorted ray
+  std::array<std::uint16_t, kSampleCount> seen{};  ///< all bits set, or 0: the lens model has no ray here
 };
 
 /// The valid samples of one frame, packed, in row-major cell order.
 struct DepthSamples {
   int count = 0;
-  alignas(32) std::array<float, kSampleCount> x, y;  ///< ray [-]
-  alignas(32) std::array<float, kSampleCount> w;     ///< inverse depth [1/m]
-  std::array<std::int16_t, kSampleCount> of_cell;    ///< cell to sample index, -1 where invalid
-  std::array<std::int16_t, kSampleCount> cell;       ///< sample index to cell
+  static constexpr std::size_t kRoom = kSampleCount + 16;  ///< a vector beyond the last sample may be written
+  alignas(64) std::array<float, kRoom> x, y;               ///< ray [-]
+  alignas(64) std::array<float, kRoom> w;                  ///< inverse depth [1/m]
+  alignas(64) std::array<std::int32_t, kRoom> cell;        ///< sample index to cell
+  std::array<std::int16_t, kSampleCount> of_cell;          ///< cell to sample index, -1 where invalid
 };
 
 /// Range of depth that counts [m].

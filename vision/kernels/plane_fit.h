@@ -58,5 +58,8 @@ struct PlaneFit {
 /// Least squares over the samples within tolerance of `start`. Invalid with fewer than 8 of them or when they do not
 /// span two directions.
 PlaneFit fit_inliers(const InverseDepths& points, const InversePlane& start, const PlaneTolerance& t) WASP_REALTIME;
+/// The same plane without its statistics: `plane` becomes the fit of those within tolerance of it. False, and `plane`
+/// not to be used, where fit_inliers() would be invalid.
+bool refine(const InverseDepths& points, const PlaneTolerance& t, InversePlane& plane) WASP_REALTIME;
 
 }  // namespace wasp::vision
