@@ -14,6 +14,8 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
+#include <cstring>
 #include <utility>
 
 #include "vision/kernels/depth_median_network.h"
@@ -153,55 +155,151 @@ void dense(const DepthView& depth, std::uint16_t* out, int out_stride_px) {
   }
 }
 
-/// Values of up to one vector of windows: tap by tap, a lane a window.
-struct Taps {
-  HWY_ALIGN_MAX std::uint16_t mm[25][hn::MaxLanes(kWords)];
+constexpr bool kLittleEndian = std::endian::native == std::endian::little;
+
+/// Eight values of a row of the image: what a window needs of it, and three more that come along.
+const hn::FixedTag<std::uint16_t, 8> kEight;
+const hn::Repartition<std::uint8_t, decltype(kEight)> kEightBytes;
+
+/// Windows of as many samples as a vector has lanes, row by row. The window of lane 8 b + i is in slot
+/// i * lanes / 8 + b, so that transposing within blocks of eight lanes brings it to its lane.
+struct Windows {
+  HWY_ALIGN_MAX std::uint16_t row[5][hn::MaxLanes(kWords)][8];
 };
 
-HWY_INLINE void gather_window(const DepthView& depth, DepthPixel at, std::size_t lane, Taps& taps) {
-  const int u = at.u_px, v = at.v_px;
-  if (u >= 2 && v >= 2 && u < depth.width_px - 2 && v < depth.height_px - 2) {
-    const std::uint16_t* p = depth.row(v - 2) + u - 2;
-    for (std::size_t k = 0; k < 25; k += 5, p += depth.stride_px)
-      for (std::size_t j = 0; j < 5; ++j) taps.mm[k + j][lane] = p[j];
-  } else if (u >= 0 && v >= 0 && u < depth.width_px && v < depth.height_px) {
-    const MedianWindow window = window_at(depth, u, v);
-    for (std::size_t k = 0; k < 25; ++k) taps.mm[k][lane] = window.mm[k];
-  } else {
-    for (auto& tap : taps.mm) tap[lane] = 0;
+/// Which of eight values, of which a window's first column is kShift - 2 before or after the first, its columns are:
+/// the outermost is repeated beyond the border.
+constexpr auto kShifts = [] {
+  std::array<std::array<std::uint8_t, 16>, 8> shifts{};
+  for (int shift = 0; shift < 8; ++shift)
+    for (int i = 0; i < 16; ++i)
+      shifts[static_cast<std::size_t>(shift)][static_cast<std::size_t>(i)] =
+          static_cast<std::uint8_t>(2 * std::clamp(shift - 2 + i / 2, 0, 7) + i % 2);
+  return shifts;
+}();
+
+HWY_INLINE void fetch_at_border(const DepthView& depth, int u, int v, std::size_t slot, Windows& windows) {
+  const int left = std::clamp(u - 2, 0, depth.width_px - 8);
+  const auto shift = hn::LoadU(kEightBytes, kShifts[static_cast<std::size_t>(u - left)].data());
+  for (int k = 0; k < 5; ++k) {
+    const auto eight = hn::LoadU(kEight, depth.row(std::clamp(v + k - 2, 0, depth.height_px - 1)) + left);
+    const auto shifted = hn::TableLookupBytes(hn::BitCast(kEightBytes, eight), shift);
+    hn::Store(hn::BitCast(kEight, shifted), kEight, windows.row[k][slot]);
   }
 }
 
-HWY_INLINE Words median_of_valid(const Taps& taps, int min_valid) {
+/// A window that is not wholly inside, or has no three values to its right.
+HWY_NOINLINE void fetch_special(const DepthView& depth, DepthPixel at, std::size_t slot, Windows& windows) {
+  if (at.u_px >= 0 && at.v_px >= 0 && at.u_px < depth.width_px && at.v_px < depth.height_px)
+    return fetch_at_border(depth, at.u_px, at.v_px, slot, windows);
+  for (auto& row : windows.row) hn::Store(hn::Zero(kEight), kEight, row[slot]);
+}
+
+/// Where the windows of `n` pixels begin, as an offset into the image; -1 for special ones and beyond n.
+HWY_INLINE void place(const DepthView& depth, const DepthPixel* pixels, std::size_t n, std::int32_t* offsets) {
+  const hn::CappedTag<std::int32_t, hn::MaxLanes(kWords)> d;
+  constexpr std::size_t kAll = hn::MaxLanes(kWords);
+  HWY_ALIGN_MAX std::int32_t packed[kAll];
+  static_assert(sizeof(DepthPixel) == sizeof(std::int32_t));
+  std::fill_n(packed, kAll, -1);
+  std::memcpy(packed, pixels, n * sizeof *pixels);
+  const auto one = hn::Set(d, 1), two = hn::Set(d, 2);
+  const auto right = hn::Set(d, depth.width_px - 5), bottom = hn::Set(d, depth.height_px - 2);
+  const auto stride = hn::Set(d, depth.stride_px);
+  for (std::size_t i = 0; i < kAll; i += hn::Lanes(d)) {
+    const auto both = hn::Load(d, packed + i);
+    const auto first = hn::ShiftRight<16>(hn::ShiftLeft<16>(both)), second = hn::ShiftRight<16>(both);
+    const auto &u = kLittleEndian ? first : second, &v = kLittleEndian ? second : first;
+    const auto inside = hn::And(hn::And(hn::Gt(u, one), hn::Lt(u, right)), hn::And(hn::Gt(v, one), hn::Lt(v, bottom)));
+    const auto offset = hn::Add(hn::Mul(hn::Sub(v, two), stride), hn::Sub(u, two));
+    hn::Store(hn::IfThenElse(inside, offset, hn::Set(d, -1)), d, offsets + i);
+  }
+}
+
+HWY_INLINE void fetch(const DepthView& depth, const DepthPixel* pixels, std::size_t n, Windows& windows) {
+  constexpr std::size_t kStep = hn::MaxLanes(kWords) / 8;
+  HWY_ALIGN_MAX std::int32_t offsets[8 * kStep];
+  place(depth, pixels, n, offsets);
+  const std::uint16_t* const data = depth.data;
+  const std::ptrdiff_t stride = depth.stride_px;
+  for (std::size_t i = 0; i < 8; ++i)
+#pragma GCC unroll 8
+    for (std::size_t block = 0; block < kStep; ++block) {
+      const std::size_t lane = 8 * block + i, slot = i * kStep + block;
+      const std::int32_t offset = offsets[lane];
+      const std::uint16_t* p = data + offset;
+      if (HWY_LIKELY(offset >= 0)) {
+#pragma GCC unroll 5
+        for (int k = 0; k < 5; ++k) hn::Store(hn::LoadU(kEight, p + k * stride), kEight, windows.row[k][slot]);
+      } else {
+        fetch_special(depth, lane < n ? pixels[lane] : DepthPixel{-1, -1}, slot, windows);
+      }
+    }
+}
+
+/// One row of the windows to five vectors, one a column.
+HWY_INLINE void transpose(const std::uint16_t (*row)[8], Words* column) {
+  const hn::RepartitionToWide<decltype(kWords)> d32;
+  const hn::RepartitionToWide<decltype(d32)> d64;
+  constexpr std::size_t kStep = hn::MaxLanes(kWords) / 8;
+  decltype(hn::Zero(d32)) low[4], high[4];
+  for (std::size_t i = 0; i < 4; ++i) {
+    const Words a = hn::Load(kWords, row[2 * i * kStep]), b = hn::Load(kWords, row[(2 * i + 1) * kStep]);
+    low[i] = hn::BitCast(d32, hn::InterleaveLower(kWords, a, b));
+    high[i] = hn::BitCast(d32, hn::InterleaveUpper(kWords, a, b));
+  }
+  const auto lower = [&](auto a, auto b) HWY_ATTR { return hn::BitCast(d64, hn::InterleaveLower(d32, a, b)); };
+  const auto upper = [&](auto a, auto b) HWY_ATTR { return hn::BitCast(d64, hn::InterleaveUpper(d32, a, b)); };
+  const auto first01 = lower(low[0], low[1]), last01 = lower(low[2], low[3]);
+  const auto first23 = upper(low[0], low[1]), last23 = upper(low[2], low[3]);
+  column[0] = hn::BitCast(kWords, hn::InterleaveLower(d64, first01, last01));
+  column[1] = hn::BitCast(kWords, hn::InterleaveUpper(d64, first01, last01));
+  column[2] = hn::BitCast(kWords, hn::InterleaveLower(d64, first23, last23));
+  column[3] = hn::BitCast(kWords, hn::InterleaveUpper(d64, first23, last23));
+  column[4] = hn::BitCast(kWords, hn::InterleaveLower(d64, lower(high[0], high[1]), lower(high[2], high[3])));
+}
+
+/// Invalid values become 0 and 65535 in turn; where all are invalid that leaves 0.
+HWY_INLINE Words median_of_valid(const Windows& windows, int min_valid) {
   Words wire[25];
   Words turn = hn::Zero(kWords), invalid_count = turn;
-  const Words zero = turn, full = hn::Set(kWords, std::uint16_t{65535});
+  const Words zero = turn, one = hn::Set(kWords, std::uint16_t{1}), all = hn::Set(kWords, std::uint16_t{65535});
+#pragma GCC unroll 5
+  for (std::size_t k = 0; k < 5; ++k) transpose(windows.row[k], wire + 5 * k);
+#pragma GCC unroll 25
   for (std::size_t k = 0; k < 25; ++k) {
-    const Words mm = hn::Load(kWords, taps.mm[k]);
-    const Words invalid = hn::VecFromMask(kWords, hn::Or(hn::Eq(mm, zero), hn::Eq(mm, full)));
-    wire[k] = hn::Or(hn::And(invalid, turn), hn::AndNot(invalid, mm));
-    turn = hn::Xor(turn, invalid);
-    invalid_count = hn::Sub(invalid_count, invalid);
+    Words& mm = wire[k];
+    const Words next = hn::Add(mm, one);  // 65535 and 0 become 0 and 1
+    const auto invalid = hn::Eq(hn::Min(next, one), next);
+    mm = hn::IfThenElse(invalid, turn, mm);
+    turn = hn::Xor(turn, hn::IfThenElseZero(invalid, all));
+    if (min_valid > 1) invalid_count = hn::Add(invalid_count, hn::IfThenElseZero(invalid, one));
   }
   for (std::size_t column = 0; column < 5; ++column) run_network<kSortFive, 5>(wire + column);
   run_network<kOrderNeighbours>(wire);
   run_network<kMedianOfSortedColumns>(wire);
   const Words most = hn::Set(kWords, static_cast<std::uint16_t>(25 - min_valid));
-  const Words enough = hn::VecFromMask(kWords, hn::Eq(hn::SaturatedSub(invalid_count, most), zero));
-  return hn::And(wire[kMedianWire], enough);
+  return hn::IfThenElseZero(hn::Eq(hn::SaturatedSub(invalid_count, most), zero), wire[kMedianWire]);
 }
 
+/// A vector's windows are fetched before the vector before it is worked on: by then they have left for the cache, and
+/// misses overlap with work.
 void at_samples(const DepthView& depth, std::span<const DepthPixel> pixels, int min_valid,
                 std::span<std::uint16_t> out) {
-  const std::size_t lanes = hn::Lanes(kWords);
-  Taps taps;
-  for (std::size_t begin = 0; begin < pixels.size(); begin += lanes) {
-    const std::size_t n = std::min(lanes, pixels.size() - begin);
-    for (std::size_t lane = 0; lane < n; ++lane) gather_window(depth, pixels[begin + lane], lane, taps);
-    for (std::size_t lane = n; lane < lanes; ++lane) gather_window(depth, {-1, -1}, lane, taps);
-    HWY_ALIGN_MAX std::uint16_t result[hn::MaxLanes(kWords)];
-    hn::Store(median_of_valid(taps, min_valid), kWords, result);
-    std::copy_n(result, n, out.begin() + static_cast<std::ptrdiff_t>(begin));
+  constexpr std::size_t kLanes = hn::MaxLanes(kWords);
+  const bool far_apart = static_cast<std::int64_t>(depth.stride_px) * depth.height_px > INT32_MAX;
+  if (depth.width_px < 8 || far_apart) return median_5x5_at_reference(depth, pixels, min_valid, out);
+  Windows windows[2];
+  const auto fetch_from = [&](std::size_t begin) HWY_ATTR {
+    if (begin < pixels.size())
+      fetch(depth, pixels.data() + begin, std::min(kLanes, pixels.size() - begin), windows[begin / kLanes % 2]);
+  };
+  fetch_from(0);
+  for (std::size_t begin = 0; begin < pixels.size(); begin += kLanes) {
+    fetch_from(begin + kLanes);
+    HWY_ALIGN_MAX std::uint16_t result[kLanes];
+    hn::Store(median_of_valid(windows[begin / kLanes % 2], min_valid), kWords, result);
+    std::copy_n(result, std::min(kLanes, pixels.size() - begin), out.begin() + static_cast<std::ptrdiff_t>(begin));
   }
 }
 
