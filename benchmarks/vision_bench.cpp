@@ -28,7 +28,8 @@ constexpr int kMaxBlockCalls = 2'000;
 
 struct Track {
   std::vector<std::int64_t> all_ns;  ///< every timed call
-  std::vector<double> ratios;        ///< of each call to ours on the same input in the same block
+  std::vector<double> ratios;        ///< of each call to ours on the same judged input in the same block
+  std::vector<double> other_ratios;  ///< the same on the other inputs
   std::vector<double> block_ratios;  ///< median of `ratios` of each block
 };
 
@@ -79,13 +80,19 @@ double median(std::vector<double> values) {
   return values.empty() ? 0 : values[values.size() / 2];
 }
 
-void add_block(Track& track, const std::vector<std::int64_t>& times, const std::vector<std::int64_t>& ours) {
+/// Call i of either was on input (first + i) mod inputs.
+void add_block(Track& track, const VisionRow& row, int first, const std::vector<std::int64_t>& times,
+               const std::vector<std::int64_t>& ours) {
   track.all_ns.insert(track.all_ns.end(), times.begin(), times.end());
+  const int inputs = static_cast<int>(row.inputs.size());
   std::vector<double> ratios;
-  for (std::size_t i = 0; i < std::min(times.size(), ours.size()); ++i)
-    ratios.push_back(static_cast<double>(times[i]) / static_cast<double>(std::max<std::int64_t>(ours[i], 1)));
+  for (std::size_t i = 0; i < std::min(times.size(), ours.size()); ++i) {
+    const int input = (first + static_cast<int>(i)) % inputs;
+    std::vector<double>& to = !row.judged || row.judged(input) ? ratios : track.other_ratios;
+    to.push_back(static_cast<double>(times[i]) / static_cast<double>(std::max<std::int64_t>(ours[i], 1)));
+  }
   track.ratios.insert(track.ratios.end(), ratios.begin(), ratios.end());
-  track.block_ratios.push_back(median(ratios));
+  if (!ratios.empty()) track.block_ratios.push_back(median(ratios));
 }
 
 std::string spread(const std::vector<double>& values) {
@@ -139,7 +146,7 @@ Outcome measure(const VisionRow& row, double seconds) {
       calls = std::max(calls, static_cast<int>(times[i].size()));
     }
     times[0] = run_calls(row.ours, inputs, first, calls, 0);
-    for (std::size_t i = 0; i < times.size(); ++i) add_block(outcome.tracks[i], times[i], times[0]);
+    for (std::size_t i = 0; i < times.size(); ++i) add_block(outcome.tracks[i], row, first, times[i], times[0]);
   }
   run_tail(row, outcome);
   return outcome;
@@ -159,6 +166,8 @@ void report_row(Report& report, const VisionRow& row, const Outcome& outcome) {
       report.bar_at_least(name, median(theirs.ratios), "1", peer.ratio_bar, spread(theirs.block_ratios));
     else
       report.figure(name, median(theirs.ratios), "1", spread(theirs.block_ratios));
+    if (!theirs.other_ratios.empty())
+      report.figure(name + ".adversarial", median(theirs.other_ratios), "1", "inputs the bar is not about");
   }
   if (row.floor_us > 0) {
     char text[64];

@@ -28,7 +28,9 @@ struct VisionRow {
   std::function<void(int)> ours;
   std::vector<VisionPeer> peers;
   std::function<int(int)> trips = {};  ///< trip count of input i where time depends on the data; empty where it cannot
-  std::string bound = {};              ///< what bounds the time: "fixed trip counts", "at most 3 x 16 iterations"
+  /// Inputs the bars are about; the ratio over the others is a figure of its own. Empty: all. p99.9 and max: all.
+  std::function<bool(int)> judged = {};
+  std::string bound = {};  ///< what bounds the time: "fixed trip counts", "at most 3 x 16 iterations"
 };
 
 /// Keeps the compiler from dropping a result.

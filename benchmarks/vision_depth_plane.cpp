@@ -26,11 +26,22 @@ VisionRow plane_row(const VisionData& data, bool cold) {
       .inputs = data.names(data.depth),
       .ours = {},
       .peers = {},
-      .bound = "at most 3 rounds of fixed trip counts"};
+      .bound = "trips are three-point draws, at most " + std::to_string(vision::kMaxPlaneDraws)};
+  // A ratio needs both to find a plane: the bars are about frames with a floor in them, real ones and made rooms.
+  // Noise, checkerboards and empty frames are in p99.9, max and the trip count.
+  row.judged = [&data](int i) {
+    const DepthFrame& frame = data.depth[static_cast<std::size_t>(i)];
+    return frame.real || frame.name.starts_with("room");
+  };
   row.ours = [&data, states, cold](int i) {
     const auto at = static_cast<std::size_t>(i);
     if (cold) (*states)[at].warm = false;
     keep(vision::estimate_floor({}, data.depth_intrinsics, data.depth[at].view(), prior(), (*states)[at]));
+  };
+  row.trips = [&data, states, cold](int i) {
+    const auto at = static_cast<std::size_t>(i);
+    if (cold) (*states)[at].warm = false;
+    return vision::estimate_floor({}, data.depth_intrinsics, data.depth[at].view(), prior(), (*states)[at]).draws;
   };
   return row;
 }

@@ -44,7 +44,8 @@ std::vector<VisionRow> log_polar_rows(const VisionData& data) {
   row.what = std::string("256x256 log-polar map of 640x480, bilinear, ") + vision::remap_target();
   row.floor_us = 36;
   row.inputs = data.names(data.gray);
-  row.bound = "fixed trip counts, no branch on the data";
+  row.trips = [](int) { return kSide * kSide; };
+  row.bound = "trips are pixels of the map, no branch on the data";
   row.ours = [=](int i) {
     map->transform(image(i), out->data());
     keep(*out);

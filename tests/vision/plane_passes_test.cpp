@@ -86,29 +86,26 @@ TEST(PlanePasses, EqualThePlainLoopsToTheBitOnEveryTarget) {
   }
 }
 
-TEST(PlanePasses, PacksTheValidSamplesOnEveryTarget) {
+TEST(DepthSamples, StayInTheirCellsAndTheValidOnesAreListed) {
   auto table = std::make_unique<SampleTable>();
   ASSERT_TRUE(prepare(*table, Intrinsics{}));
   std::mt19937 random(3);
   for (const unsigned invalid : {0u, 1u, 50u, 99u, 100u}) {
-    std::vector<std::uint16_t> mm(kSampleCount);
-    for (auto& d : mm)
-      d = static_cast<std::uint16_t>(random() % 100 < invalid ? (random() % 2 != 0 ? 0 : 65535)
-                                                              : 300 + random() % 7700);
-    on_every_target([&](const std::string&) {
-      auto out = std::make_unique<DepthSamples>();
-      pass_pack(*table, mm.data(), 300, 7999, *out);
-      std::size_t n = 0;
-      for (std::size_t i = 0; i < kSampleCount; ++i) {
-        if (mm[i] < 300 || mm[i] > 7999) continue;
-        ASSERT_EQ(out->cell[n], static_cast<int>(i));
-        ASSERT_EQ(out->x[n], table->x[i]);
-        ASSERT_EQ(out->y[n], table->y[i]);
-        ASSERT_EQ(out->w[n], 1000.f / static_cast<float>(mm[i]));
-        ++n;
-      }
-      EXPECT_EQ(out->count, static_cast<int>(n));
-    });
+    test::DepthImage image{640, 480, std::vector<std::uint16_t>(640 * 480)};
+    for (auto& mm : image.mm)
+      mm = static_cast<std::uint16_t>(random() % 100 < invalid ? (random() % 2 != 0 ? 0 : 65535)
+                                                               : 301 + random() % 7698);
+    auto out = std::make_unique<DepthSamples>();
+    gather(*table, image.view(), {}, *out);
+    std::size_t n = 0;
+    for (std::size_t i = 0; i < kSampleCount; ++i) {
+      const int mm = image.view().row(table->v_px[i])[table->u_px[i]];
+      const bool valid = mm != 0 && mm != 65535;
+      ASSERT_EQ(out->w[i], valid ? 1000.f / static_cast<float>(mm) : kAbsent_per_m);
+      if (!valid) continue;
+      ASSERT_EQ(out->valid[n++], static_cast<int>(i));
+    }
+    EXPECT_EQ(out->count, static_cast<int>(n));
   }
 }
 

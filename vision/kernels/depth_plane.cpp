@@ -10,16 +10,18 @@ namespace {
 
 constexpr int kPreviewCount = 256;
 constexpr int kGravityDraws = 32;  // one-point candidates with the normal straight up
+constexpr int kRounds = 3;         // of drawing and fitting, until something passes the gates
 constexpr int kBatch = 64;         // three-point draws between two looks at whether they suffice
 constexpr int kMaxBatches = 8, kMostScored = 112;
+static_assert(kRounds * kMaxBatches * kBatch == kMaxPlaneDraws);
 /// Enough batches for a plane of this share: a better one would have a larger share and have been drawn as well.
 constexpr std::array kEnoughShare = {2.f, 0.5f, 0.4f, 0.2f, 0.2f, 0.2f, 0.2f, 0.f};
 /// Last frame's plane spares the draws while it keeps its support and nothing lies below it; one batch remains, to
 /// leave within a few frames a plane it should not have settled on.
 constexpr float kHeldBelow = 0.01f;
-constexpr int kRounds = 3;  // of drawing and fitting, until something passes the gates
 constexpr int kKept = 4;
 constexpr int kPolishPasses = 4;
+constexpr float kSettled = 1e-10f;  // squared relative change of a plane that its inliers no longer move
 constexpr std::array kReachCells = {4, 7, 10, 16};  // of a three-point draw about its first point, in turn
 constexpr int kBelowPenalty = 4;                    // one sample below outweighs four on the plane
 constexpr float kSigmas = 3.f;
@@ -35,13 +37,13 @@ struct Candidate {
 
 /// Everything one frame needs, gathered once.
 struct Frame {
-  DepthSamples samples;
-  alignas(64) std::array<float, kPreviewCount> x, y, w;  ///< every n-th sample, padded with points far above
+  explicit Frame(const SampleTable& t) noexcept : table(t) {}  // leaves the arrays to gather() and fill_preview()
 
-  [[nodiscard]] InverseDepths all() const noexcept {
-    const auto n = static_cast<std::size_t>(samples.count);
-    return {{samples.x.data(), n}, {samples.y.data(), n}, {samples.w.data(), n}};
-  }
+  const SampleTable& table;
+  DepthSamples samples;
+  alignas(64) std::array<float, kPreviewCount> x, y, w;  ///< every n-th valid sample
+
+  [[nodiscard]] InverseDepths all() const noexcept { return {table.x, table.y, samples.w}; }
   [[nodiscard]] InverseDepths preview() const noexcept { return {x, y, w}; }
 };
 
@@ -51,17 +53,18 @@ struct Search {
   PlaneTolerance tolerance;
   float cos_max_angle;
   std::array<Candidate, kKept> kept{};
+  int draws = 0;
 };
 
 void fill_preview(Frame& frame) noexcept {
   const int n = frame.samples.count;
   for (int i = 0; i < kPreviewCount; ++i) {
     const auto to = static_cast<std::size_t>(i);
-    const bool real = n > kPreviewCount || i < n;
-    const auto from = static_cast<std::size_t>(n > kPreviewCount ? i * n / kPreviewCount : std::min(i, n - 1));
-    frame.x[to] = frame.samples.x[from];
-    frame.y[to] = frame.samples.y[from];
-    frame.w[to] = real ? frame.samples.w[from] : 1e6f;
+    const int nth = n > kPreviewCount ? i * n / kPreviewCount : std::min(i, n - 1);
+    const auto cell = static_cast<std::size_t>(frame.samples.valid[static_cast<std::size_t>(nth)]);
+    frame.x[to] = frame.table.x[cell];
+    frame.y[to] = frame.table.y[cell];
+    frame.w[to] = i < n ? frame.samples.w[cell] : kAbsent_per_m;
   }
 }
 
@@ -101,19 +104,25 @@ bool consider(Search& search, const InversePlane& plane) noexcept {
 }
 
 /// Rise of a sample's ray above the camera, along the prior's up, for each metre of depth.
-float slope_up(const Search& search, int index) noexcept {
-  const auto i = static_cast<std::size_t>(index);
-  const DepthSamples& s = search.frame.samples;
+float slope_up(const Search& search, int cell) noexcept {
+  const auto i = static_cast<std::size_t>(cell);
+  const SampleTable& s = search.frame.table;
   const Vec3& up = search.prior.up_cam;
   return up.x() * s.x[i] + up.y() * s.y[i] + up.z();
 }
 
-float w_of(const Search& search, int index) noexcept { return search.frame.samples.w[static_cast<std::size_t>(index)]; }
+float w_of(const Search& search, int cell) noexcept { return search.frame.samples.w[static_cast<std::size_t>(cell)]; }
+
+/// The cell of a random valid sample.
+int draw_any(const Search& search, PseudoRandom& random) noexcept {
+  const DepthSamples& s = search.frame.samples;
+  return s.valid[static_cast<std::size_t>(random.below(s.count))];
+}
 
 /// The plane with normal `up` through sample i: n . X = -h, w = -(n . ray) / h, h = -(n . ray) / w.
 void consider_gravity(Search& search, PseudoRandom& random) noexcept {
-  const int index = random.below(search.frame.samples.count);
-  const float height_m = -slope_up(search, index) / w_of(search, index);
+  const int cell = draw_any(search, random);
+  const float height_m = -slope_up(search, cell) / w_of(search, cell);
   if (!(height_m > kMinHeight_m)) return;
   const Vec3 gradient = -search.prior.up_cam / height_m;
   consider(search, {gradient.x(), gradient.y(), gradient.z()});
@@ -121,37 +130,36 @@ void consider_gravity(Search& search, PseudoRandom& random) noexcept {
 
 /// The lower of two random samples, going by the prior's up: floors are found at the bottom of things.
 int draw_low(const Search& search, PseudoRandom& random) noexcept {
-  const DepthSamples& s = search.frame.samples;
-  const int first = random.below(s.count), second = random.below(s.count);
+  const int first = draw_any(search, random), second = draw_any(search, random);
   const bool first_is_lower =
       slope_up(search, first) * w_of(search, second) < slope_up(search, second) * w_of(search, first);
   return first_is_lower ? first : second;
 }
 
 struct Triples {
-  std::array<std::array<std::int16_t, 3>, kBatch> sample;
+  std::array<std::array<std::int16_t, 3>, kBatch> cell;
   int count = 0;
 };
 
-/// The sample of a cell at most `reach` cells from `cell`, or -1. No branches: which way they go would be a guess.
-int draw_near(const DepthSamples& s, int cell, int reach, PseudoRandom& random) noexcept {
+/// A cell at most `reach` cells from `cell`, -1 where that is outside. No branches: which way they go would be a guess.
+int draw_near(int cell, int reach, PseudoRandom& random) noexcept {
   const int column = cell % kSampleColumns + random.below(2 * reach + 1) - reach;
   const int row = cell / kSampleColumns + random.below(2 * reach + 1) - reach;
   const int inside = static_cast<int>(static_cast<unsigned>(column) < static_cast<unsigned>(kSampleColumns)) &
                      static_cast<int>(static_cast<unsigned>(row) < static_cast<unsigned>(kSampleRows));
-  return (s.of_cell[static_cast<std::size_t>(-inside & (row * kSampleColumns + column))] | (inside - 1));
+  return (row * kSampleColumns + column) | (inside - 1);
 }
 
 Triples draw_triples(const Search& search, PseudoRandom& random) noexcept {
-  const DepthSamples& s = search.frame.samples;
   Triples triples;
   for (std::size_t draw = 0; draw < kBatch; ++draw) {
-    const int first = draw_low(search, random), cell = s.cell[static_cast<std::size_t>(first)];
-    const int reach = kReachCells[draw % kReachCells.size()];
-    const int second = draw_near(s, cell, reach, random), third = draw_near(s, cell, reach, random);
-    triples.sample[static_cast<std::size_t>(triples.count)] = {
+    const int reach = kReachCells[draw % kReachCells.size()], first = draw_low(search, random);
+    const int second = draw_near(first, reach, random), third = draw_near(first, reach, random);
+    triples.cell[static_cast<std::size_t>(triples.count)] = {
         static_cast<std::int16_t>(first), static_cast<std::int16_t>(second), static_cast<std::int16_t>(third)};
-    triples.count += static_cast<int>((second | third) >= 0);
+    const bool present =
+        w_of(search, std::max(second, 0)) < kAbsent_per_m && w_of(search, std::max(third, 0)) < kAbsent_per_m;
+    triples.count += static_cast<int>((second | third) >= 0) & static_cast<int>(present);
   }
   return triples;
 }
@@ -163,7 +171,7 @@ int consider_triples(Search& search, PseudoRandom& random) noexcept {
   std::array<InversePlane, kBatch + 1> planes;
   int count = 0;
   for (std::size_t i = 0; i < static_cast<std::size_t>(triples.count); ++i) {
-    const auto& t = triples.sample[i];
+    const auto& t = triples.cell[i];
     InversePlane& plane = planes[static_cast<std::size_t>(count)];
     const bool spans = plane_through(all, {t[0], t[1], t[2]}, kMinTripleArea, plane);
     count += static_cast<int>(spans) & static_cast<int>(plausible(search, plane));
@@ -194,8 +202,9 @@ int best_score(const Search& search) noexcept {
   return best;
 }
 
-/// `thorough`: all the draws, because what an earlier round stopped for did not pass the gates.
-void draw_candidates(Search& search, DepthPlaneState& state, bool thorough) noexcept {
+/// `thorough`: all the draws, because what an earlier round stopped for did not pass the gates. Returns whether last
+/// frame's plane is held.
+bool draw_candidates(Search& search, DepthPlaneState& state, bool thorough) noexcept {
   const Last last = consider_last(search, state);
   if (search.prior.measured)
     for (int i = 0; i < kGravityDraws; ++i) consider_gravity(search, state.random);
@@ -203,20 +212,23 @@ void draw_candidates(Search& search, DepthPlaneState& state, bool thorough) noex
   const int batches = last == Last::kHeld ? 1 : last == Last::kThere ? 2 : kMaxBatches;
   for (int batch = 0, scored = 0; batch < batches && scored < kMostScored; ++batch) {
     scored += consider_triples(search, state.random);
+    search.draws += kBatch;
     const float enough = kEnoughShare[static_cast<std::size_t>(batch)] * seen;
     if (!thorough && static_cast<float>(best_score(search)) >= enough) break;
   }
+  return last == Last::kHeld;
 }
 
 PlaneTolerance widened(const PlaneTolerance& t, float factor) noexcept {
   return {factor * t.sensor_per_m, factor * t.flatness_m};
 }
 
-/// Fits every kept candidate to all samples, wide first to be drawn in from afar, and returns the best of them.
-Candidate best_fitted(const Search& search) noexcept {
+/// Fits the kept candidates to all samples, wide first to be drawn in from afar, and returns the best of them. Only
+/// those are fitted that a fit may lift above the best: beside a held plane none, else those with half its score.
+Candidate best_fitted(const Search& search, bool held) noexcept {
   Candidate best;
   const InverseDepths all = search.frame.all();
-  const int worth_it = std::max(best_score(search), 0) / 2;
+  const int top = best_score(search), worth_it = held ? top : top > 0 ? top / 2 : Candidate{}.score;
   for (const Candidate& candidate : search.kept) {
     if (candidate.score == Candidate{}.score || candidate.score < worth_it) continue;
     InversePlane plane = candidate.plane;
@@ -250,8 +262,12 @@ bool passes(const DepthPlaneParams& params, const PlaneEstimate& e, const PlaneS
 
 PlaneEstimate polish(const DepthPlaneParams& params, const Search& search, const InversePlane& start) noexcept {
   InversePlane plane = start;
-  for (int pass = 0; pass + 1 < kPolishPasses; ++pass)
+  bool moved = true;
+  for (int pass = 0; pass + 1 < kPolishPasses && moved; ++pass) {
+    const Vec3 before = plane.gradient();
     if (!refine(search.frame.all(), search.tolerance, plane)) return {};
+    moved = (plane.gradient() - before).squaredNorm() > kSettled * before.squaredNorm();
+  }
   const PlaneFit fit = fit_inliers(search.frame.all(), plane, search.tolerance);
   if (!fit.valid || !plausible(search, fit.plane)) return {};
   const PlaneSupport support = count_support(search.frame.all(), fit.plane, search.tolerance);
@@ -276,7 +292,7 @@ PlaneEstimate estimate_floor(const DepthPlaneParams& params, const Intrinsics& i
     state.warm = false;
     return {};
   }
-  Frame frame;
+  Frame frame(state.table);
   gather(state.table, depth, params.range, frame.samples);
   if (frame.samples.count < std::max(params.min_inliers, 8)) {
     state.warm = false;
@@ -286,11 +302,12 @@ PlaneEstimate estimate_floor(const DepthPlaneParams& params, const Intrinsics& i
   Search search{frame, prior, {kSigmas * params.sensor_sigma_per_m, params.flatness_m}, std::cos(prior.max_angle_rad)};
   PlaneEstimate estimate;
   for (int round = 0; round < kRounds && !estimate.valid; ++round) {
-    draw_candidates(search, state, round > 0);
-    const Candidate best = best_fitted(search);
+    const bool held = draw_candidates(search, state, round > 0);
+    const Candidate best = best_fitted(search, held);
     if (best.score != Candidate{}.score) estimate = polish(params, search, best.plane);
     state.warm = false;  // another round starts from nothing
   }
+  estimate.draws = search.draws;
   state.warm = estimate.valid;
   if (estimate.valid) {
     state.last_share = estimate.inlier_share;

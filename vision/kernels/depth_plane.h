@@ -46,7 +46,10 @@ struct PlaneEstimate {
   float below_share = 0;
   float valid_share = 0;  ///< valid samples of all samples
   float rms_m = 0;        ///< perpendicular residual of the inliers
+  int draws = 0;          ///< three-point draws it took, also when invalid; at most kMaxPlaneDraws
 };
+
+inline constexpr int kMaxPlaneDraws = 3 * 512;
 
 /// All memory of the estimator.
 struct DepthPlaneState {
@@ -58,8 +61,9 @@ struct DepthPlaneState {
 };
 
 /// One frame. `depth` is uint16 millimetres, 0 and 65535 invalid, of the size the intrinsics name; anything else, or
-/// parameters that are not finite, give an invalid estimate. Bounded: at most three rounds of fixed trip counts, the
-/// second and third only when the one before found no floor. Realtime-safe: yes.
+/// parameters that are not finite, give an invalid estimate. Bounded: at most three rounds of 512
+/// draws, the second and third only when the one before found no floor; fewer draws where a plane carries so many
+/// samples that they suffice, and 64 where last frame's plane holds and nothing lies below it. Realtime-safe: yes.
 PlaneEstimate estimate_floor(const DepthPlaneParams& params, const Intrinsics& intrinsics, const DepthView& depth,
                              const GravityPrior& prior, DepthPlaneState& state) WASP_REALTIME;
 

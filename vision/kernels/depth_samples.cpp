@@ -1,4 +1,4 @@
-// Table once; per frame fetch all pixels first, so that their cache misses overlap, then pack the valid ones.
+// Table once; per frame fetch all pixels first, so that their cache misses overlap. Nothing branches on the data.
 #include "vision/kernels/depth_samples.h"
 
 #include <algorithm>
@@ -53,13 +53,17 @@ bool prepare(SampleTable& table, const Intrinsics& k) noexcept {
 
 void gather(const SampleTable& table, const DepthView& depth, const DepthRange& range, DepthSamples& out) noexcept {
   const auto min_mm = static_cast<int>(std::clamp(range.min_m * 1000.f, 1.f, 65534.f));
-  const auto max_mm = static_cast<int>(std::clamp(range.max_m * 1000.f, 1.f, 65534.f));
+  const auto max_mm = static_cast<int>(std::clamp(range.max_m * 1000.f, static_cast<float>(min_mm), 65534.f));
   alignas(64) std::array<std::uint16_t, kSampleCount> mm;
   for (std::size_t i = 0; i < kSampleCount; ++i) mm[i] = depth.row(table.v_px[i])[table.u_px[i]] & table.seen[i];
-  pass_pack(table, mm.data(), min_mm, max_mm, out);
-  out.of_cell.fill(-1);
-  for (std::size_t i = 0; i < static_cast<std::size_t>(out.count); ++i)
-    out.of_cell[static_cast<std::size_t>(out.cell[i])] = static_cast<std::int16_t>(i);
+  pass_invert(mm, min_mm, max_mm, out.w);
+  const auto span = static_cast<unsigned>(max_mm - min_mm);  // as unsigned, one comparison tells
+  std::size_t n = 0;
+  for (std::size_t i = 0; i < kSampleCount; ++i) {
+    out.valid[n] = static_cast<std::int16_t>(i);
+    n += static_cast<unsigned>(mm[i] - min_mm) <= span ? 1 : 0;
+  }
+  out.count = static_cast<int>(n);
 }
 
 }  // namespace wasp::vision

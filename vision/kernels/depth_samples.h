@@ -20,18 +20,19 @@ inline constexpr int kMinImageSide = 16;  ///< smaller images are refused
 struct SampleTable {
   Intrinsics intrinsics{.width_px = 0, .height_px = 0};  ///< key
   std::array<std::uint16_t, kSampleCount> u_px{}, v_px{};
-  std::array<float, kSampleCount> x{}, y{};        ///< undistorted ray
-  std::array<std::uint16_t, kSampleCount> seen{};  ///< all bits set, or 0: the lens model has no ray here
+  alignas(64) std::array<float, kSampleCount> x{}, y{};  ///< undistorted ray
+  std::array<std::uint16_t, kSampleCount> seen{};        ///< all bits set, or 0: the lens model has no ray here
 };
 
-/// The valid samples of one frame, packed, in row-major cell order.
+/// Inverse depth of a cell whose pixel has none [1/m]: far above any plane, so that no count or sum takes it up.
+inline constexpr float kAbsent_per_m = 1e6f;
+
+/// One frame's samples. They stay in their cells, beside the table's rays: packing the valid ones costs more time than
+/// the passes lose on the others, and the time of a pass does not depend on how many there are.
 struct DepthSamples {
-  int count = 0;
-  static constexpr std::size_t kRoom = kSampleCount + 16;  ///< a vector beyond the last sample may be written
-  alignas(64) std::array<float, kRoom> x, y;               ///< ray [-]
-  alignas(64) std::array<float, kRoom> w;                  ///< inverse depth [1/m]
-  alignas(64) std::array<std::int32_t, kRoom> cell;        ///< sample index to cell
-  std::array<std::int16_t, kSampleCount> of_cell;          ///< cell to sample index, -1 where invalid
+  alignas(64) std::array<float, kSampleCount> w;  ///< inverse depth of each cell [1/m], or kAbsent_per_m
+  std::array<std::int16_t, kSampleCount> valid;   ///< the cells that have one, rising
+  int count = 0;                                  ///< of them
 };
 
 /// Range of depth that counts [m].

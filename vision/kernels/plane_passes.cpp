@@ -16,7 +16,6 @@ namespace wasp::vision::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 constexpr float kBelowBands = 1.5f;
-constexpr float kFarAbove_per_m = 1e6f;
 constexpr std::size_t kMaxBlock = 16;
 
 /// Calls use(x, y, w) for whole blocks of `block` samples, the last one padded.
@@ -27,7 +26,7 @@ HWY_INLINE void for_blocks(const InverseDepths& points, std::size_t block, const
   for (std::size_t i = 0; i < whole; i += block) use(x + i, y + i, w + i);
   if (whole == n) return;
   float last_x[kMaxBlock] = {}, last_y[kMaxBlock] = {}, last_w[kMaxBlock];
-  std::fill_n(last_w, kMaxBlock, kFarAbove_per_m);
+  std::fill_n(last_w, kMaxBlock, kAbsent_per_m);
   std::copy(x + whole, x + n, last_x);
   std::copy(y + whole, y + n, last_y);
   std::copy(w + whole, w + n, last_w);
@@ -122,28 +121,19 @@ PlaneMoments moments_and_distances(const InverseDepths& points, const InversePla
   return moments_of<true>(points, plane, band);
 }
 
-/// Invalid samples are written too, and then over by the next vector.
-void pack(const SampleTable& table, const std::uint16_t* mm, int min_mm, int max_mm, DepthSamples& out) {
+void invert(const std::array<std::uint16_t, kSampleCount>& mm, int min_mm, int max_mm,
+            std::array<float, kSampleCount>& w) {
   const hn::CappedTag<float, kMaxBlock> d;
   const hn::RebindToSigned<decltype(d)> di;
   const hn::Rebind<std::uint16_t, decltype(d)> d16;
-  const auto thousand = hn::Set(d, 1000.f);
+  static_assert(kSampleCount % kMaxBlock == 0);
+  const auto thousand = hn::Set(d, 1000.f), absent = hn::Set(d, kAbsent_per_m);
   const auto least = hn::Set(di, min_mm), most = hn::Set(di, max_mm);
-  auto cell = hn::Iota(di, 0);
-  std::size_t n = 0;
   for (std::size_t i = 0; i < kSampleCount; i += hn::Lanes(d)) {
-    const auto depth = hn::PromoteTo(di, hn::LoadU(d16, mm + i));
-    const auto invalid = hn::Or(hn::Lt(depth, least), hn::Gt(depth, most));
-    const auto valid = hn::RebindMask(d, hn::Not(invalid));
-    const auto w = hn::Div(thousand, hn::ConvertTo(d, depth));
-    hn::StoreU(hn::Compress(hn::LoadU(d, &table.x[i]), valid), d, &out.x[n]);
-    hn::StoreU(hn::Compress(hn::LoadU(d, &table.y[i]), valid), d, &out.y[n]);
-    hn::StoreU(hn::Compress(w, valid), d, &out.w[n]);
-    hn::StoreU(hn::Compress(cell, hn::Not(invalid)), di, &out.cell[n]);
-    n += hn::CountTrue(d, valid);
-    cell = hn::Add(cell, hn::Set(di, static_cast<std::int32_t>(hn::Lanes(di))));
+    const auto depth = hn::PromoteTo(di, hn::LoadU(d16, &mm[i]));
+    const auto outside = hn::RebindMask(d, hn::Or(hn::Lt(depth, least), hn::Gt(depth, most)));
+    hn::StoreU(hn::IfThenElse(outside, absent, hn::Div(thousand, hn::ConvertTo(d, depth))), d, &w[i]);
   }
-  out.count = static_cast<int>(n);
 }
 
 }  // namespace wasp::vision::HWY_NAMESPACE
@@ -154,8 +144,8 @@ namespace wasp::vision {
 namespace {
 HWY_EXPORT(support);
 HWY_EXPORT(moments);
+HWY_EXPORT(invert);
 HWY_EXPORT(moments_and_distances);
-HWY_EXPORT(pack);
 }  // namespace
 
 PlaneSupport pass_support(const InverseDepths& points, const InversePlane& plane, const PlaneBand& band) noexcept {
@@ -166,8 +156,9 @@ PlaneMoments pass_moments(const InverseDepths& points, const InversePlane& plane
   return distances ? HWY_DYNAMIC_DISPATCH(moments_and_distances)(points, plane, band)
                    : HWY_DYNAMIC_DISPATCH(moments)(points, plane, band);
 }
-void pass_pack(const SampleTable& table, const std::uint16_t* mm, int min_mm, int max_mm, DepthSamples& out) noexcept {
-  HWY_DYNAMIC_DISPATCH(pack)(table, mm, min_mm, max_mm, out);
+void pass_invert(const std::array<std::uint16_t, kSampleCount>& mm, int min_mm, int max_mm,
+                 std::array<float, kSampleCount>& w) noexcept {
+  HWY_DYNAMIC_DISPATCH(invert)(mm, min_mm, max_mm, w);
 }
 
 }  // namespace wasp::vision

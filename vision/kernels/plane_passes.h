@@ -1,11 +1,13 @@
-// The passes of the plane finder over its depth samples, in SIMD (Highway, instruction set chosen at run time): packing
-// the valid ones, counting who supports a plane, and the moments of those who do. Every result is the same to the bit
+// The passes of the plane finder over its depth samples, in SIMD (Highway, instruction set chosen at run time):
+// inverting depths, counting who supports a plane, and the moments of those who do. Every result is the same to the bit
 // on every instruction set: counts are exact, sums run in eight fixed lanes, and nothing is fused.
 // Realtime-safe: yes, all of it; fixed trip counts.
 #pragma once
 
+#include <array>
 #include <cstdint>
 
+#include "types/realtime.h"
 #include "vision/kernels/depth_samples.h"
 #include "vision/kernels/plane_fit.h"
 
@@ -23,13 +25,14 @@ struct PlaneMoments {
 };
 
 /// Inliers within the band; below: beyond the plane by more than 1.5 times the band.
-PlaneSupport pass_support(const InverseDepths& points, const InversePlane& plane, const PlaneBand& band) noexcept;
+PlaneSupport pass_support(const InverseDepths& points, const InversePlane& plane, const PlaneBand& band) WASP_REALTIME;
 /// dd stays 0 without `distances`.
 PlaneMoments pass_moments(const InverseDepths& points, const InversePlane& plane, const PlaneBand& band,
-                          bool distances) noexcept;
+                          bool distances) WASP_REALTIME;
 
-/// Depth of every cell's pixel in millimetres -> packed samples whose depth lies in min_mm ... max_mm (both at least
-/// 1).
-void pass_pack(const SampleTable& table, const std::uint16_t* mm, int min_mm, int max_mm, DepthSamples& out) noexcept;
+/// Depths of all cells in millimetres -> inverse depths; those outside min_mm ... max_mm (at least 1) become
+/// kAbsent_per_m.
+void pass_invert(const std::array<std::uint16_t, kSampleCount>& mm, int min_mm, int max_mm,
+                 std::array<float, kSampleCount>& w) WASP_REALTIME;
 
 }  // namespace wasp::vision
