@@ -67,7 +67,7 @@ Pooled pool(const LatencyRun& run, const std::string& load) {
 }
 
 std::string chain_text(const std::string& name, const Chain& chain) {
-  std::string text = fmt::format("  worst end to end, {}: {} =", name, duration_text(chain.total_ns));
+  std::string text = fmt::format("  worst end to end, {}: {}\n    =", name, duration_text(chain.total_ns));
   for (std::size_t i = 0; i < kChainParts.size(); ++i)
     text += fmt::format("{} {} {}", i == 0 ? "" : " +", kChainParts[i], duration_text(chain.part_ns[i]));
   return text + "\n";

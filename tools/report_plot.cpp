@@ -30,6 +30,11 @@ Range widened(Range r, double least, double margin) {
   return {middle - half, middle + half};
 }
 
+Range whole_decades(Range logs) {
+  const double low = std::floor(logs.low + 1e-9);
+  return {low, std::max(low + 1, std::ceil(logs.high - 1e-9))};
+}
+
 int legend_rows(const Plot& plot) {
   double x = kLeft;
   int rows = 1;
@@ -64,6 +69,8 @@ Frame frame_of(const Plot& plot) {
           {}};
   f.x = plot.equal_axes ? widened(range_of(xs), plot.least_y_span, 0.06) : widened(range_of(xs), 0, 0);
   f.y = widened(range_of(ys), plot.least_y_span, 0.06);
+  if (plot.x_scale != Scale::kLinear) f.x = whole_decades(range_of(xs));
+  if (plot.y_scale != Scale::kLinear) f.y = whole_decades(range_of(ys));
   if (plot.equal_axes) make_equal(f);
   return f;
 }

@@ -203,6 +203,19 @@ TEST(ReportSeries, TicksAreRoundAndCover) {
   EXPECT_EQ(tools::nice_ticks({2, 2}, 5).size(), 1u);
 }
 
+TEST(ReportPlot, LogarithmicAxesShowWholeDecades) {
+  tools::Plot plot;
+  plot.x_scale = tools::Scale::kLogDuration;
+  plot.y_scale = tools::Scale::kLog;
+  plot.curves.push_back({"c", {}, {{4.3, 5.2}, {0, -1.5}}});  // 20 us ... 160 us; 1 ... 0.03
+  const std::string svg = plot.svg();
+  for (const char* label : {">10 us<", ">100 us<", ">1 ms<", ">1<", ">0.1<", ">0.01<"})
+    EXPECT_NE(svg.find(label), std::string::npos) << label;
+  const std::string file = tools::standalone_svg(svg);
+  EXPECT_EQ(file.find("<svg xmlns="), 0u);
+  EXPECT_NE(file.find("<style>"), std::string::npos);
+}
+
 TEST(ReportPlot, EqualAxesKeepShapes) {
   tools::Plot plot;
   plot.equal_axes = true;
