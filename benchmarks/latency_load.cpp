@@ -12,7 +12,7 @@ namespace wasp::bench {
 std::vector<std::string> load_arguments(const std::string& program, const std::string& load, int cores,
                                         const std::string& folder) {
   const std::string n = std::to_string(cores);
-  std::vector<std::string> a{program, "--temp-path", folder, "--quiet"};
+  std::vector<std::string> a{"/usr/bin/nice", "-n", "19", program, "--temp-path", folder, "--quiet"};
   if (load == "cpu")
     a.insert(a.end(), {"--cpu", n});
   else if (load == "memory")  // page faults, unmapping and bandwidth

@@ -1,4 +1,6 @@
-// What stress-ng does beside a flight, on every core.
+// What stress-ng does beside a flight, on every core, at the lowest ordinary priority: the simulator stands for
+// hardware, which no load slows down. Real-time threads are above every ordinary one whatever its nice value, so for
+// them the load is the same.
 #pragma once
 
 #include <optional>

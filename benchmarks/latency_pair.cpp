@@ -17,7 +17,6 @@ namespace wasp::bench {
 namespace {
 
 constexpr DurationNs kLead = kMillisecond;
-constexpr DurationNs kWitnessPhase = 5 * kMillisecond;  // behind control's due time, in the middle of its deadline
 constexpr DurationNs kSettle = kSecond;
 
 /// The reference: cyclictest, or where it cannot run a loop of our own in its place.
@@ -64,11 +63,12 @@ class Reference {
   TimeNs end_ns_ = 0;
 };
 
-std::unique_ptr<tools::WakeupLoop> start_witness(const PairSetup& setup, DurationNs period_ns, double seconds,
+/// In the middle of control's deadline.
+std::unique_ptr<tools::WakeupLoop> start_witness(const PairSetup& setup, const FlightTimes& times, double seconds,
                                                  TimeNs due_ns) {
-  const auto room = static_cast<std::size_t>((seconds + 30) * 1e9 / static_cast<double>(period_ns));
+  const auto room = static_cast<std::size_t>((seconds + 30) * 1e9 / static_cast<double>(times.period_ns));
   return std::make_unique<tools::WakeupLoop>(tools::WakeupSpec{setup.core, setup.real_time ? setup.witness_priority : 0,
-                                                               period_ns, due_ns + kWitnessPhase, room});
+                                                               times.period_ns, due_ns + times.deadline_ns / 2, room});
 }
 
 /// The newest tick; waits for one.
@@ -113,7 +113,7 @@ PairData run_pair(PairSetup setup, const LatencyOptions& options, const scheduli
   rt::sleep_until(rt::now() + kSettle);
   flight.observer().forget();
   const TimeNs due = newest_tick(flight).value.due_at_ns;
-  const auto witness = start_witness(setup, data.times.period_ns, options.seconds, due);
+  const auto witness = start_witness(setup, data.times, options.seconds, due);
   Reference reference(setup, data.times.period_ns, options.seconds, due + setup.reference_lead_ns);
   const TimeNs start = rt::now();
   TimeNs told = start;
