@@ -2,6 +2,7 @@
 
 #include <fftw3.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <new>
 #include <stdexcept>
@@ -9,11 +10,20 @@
 namespace wasp::vision {
 namespace {
 
-unsigned flags_of(FftPlanning planning) { return planning == FftPlanning::kMeasure ? FFTW_MEASURE : FFTW_ESTIMATE; }
+constexpr int kStrip = 8;  // columns transformed together: whole cache lines
+
+/// Without buffered plans: they, two of three otherwise, take a buffer from the heap at every execution.
+unsigned flags_of(FftPlanning planning) {
+  return (planning == FftPlanning::kMeasure ? FFTW_MEASURE : FFTW_ESTIMATE) | FFTW_NO_BUFFERING;
+}
 
 std::size_t area(int rows, int columns) {
   if (rows < 1 || columns < 1) throw std::invalid_argument("FFT size below 1");
   return static_cast<std::size_t>(rows) * static_cast<std::size_t>(columns);
+}
+
+std::size_t at(int row, int pitch, int column) noexcept {
+  return static_cast<std::size_t>(row) * static_cast<std::size_t>(pitch) + static_cast<std::size_t>(column);
 }
 
 fftwf_complex* raw(std::complex<float>* p) { return reinterpret_cast<fftwf_complex*>(p); }
@@ -42,15 +52,42 @@ FftBuffer<std::complex<float>> fft_complexes(std::size_t count) {
   return buffer;
 }
 
-ComplexFft::ComplexFft(int rows, int columns, FftPlanning planning) : data_(fft_complexes(area(rows, columns))) {
+ComplexFft::ComplexFft(int rows, int columns, FftPlanning planning)
+    : rows_(rows), columns_(columns), data_(fft_complexes(area(rows, columns))) {
+  const unsigned flags = flags_of(planning);
   fftwf_complex* const z = raw(data_.get());
-  const int sizes[2] = {rows, columns};
-  const bool line = rows == 1;
-  plan_.reset(checked(fftwf_plan_dft(line ? 1 : 2, line ? sizes + 1 : sizes, z, z, FFTW_FORWARD, flags_of(planning))));
+  if (rows == 1) {
+    along_rows_.reset(checked(fftwf_plan_dft_1d(columns, z, z, FFTW_FORWARD, flags)));
+  } else {
+    middle_ = fft_complexes(area(rows, columns));
+    strip_ = fft_complexes(area(strip_pitch(), kStrip));
+    along_rows_.reset(checked(fftwf_plan_many_dft(1, &columns, rows, z, nullptr, 1, columns, raw(middle_.get()),
+                                                  nullptr, 1, columns, FFTW_FORWARD, flags)));
+    if (columns >= kStrip) along_strip_ = plan_strip(kStrip, flags);
+    if (columns % kStrip != 0) along_rest_ = plan_strip(columns % kStrip, flags);
+  }
   for (std::size_t i = 0; i < area(rows, columns); ++i) data_[i] = 0.f;  // measuring left its own values
 }
 
-void ComplexFft::execute() const noexcept { fftwf_execute(plan_.get()); }
+ComplexFft::Plan ComplexFft::plan_strip(int columns, unsigned flags) const {
+  return Plan(checked(fftwf_plan_many_dft(1, &rows_, columns, raw(middle_.get()), nullptr, columns_, 1,
+                                          raw(strip_.get()), nullptr, 1, strip_pitch(), FFTW_FORWARD, flags)));
+}
+
+void ComplexFft::execute() const noexcept {
+  fftwf_execute(along_rows_.get());
+  if (rows_ == 1) return;
+  for (int column = 0; column < columns_; column += kStrip)
+    transform_strip(column, std::min(kStrip, columns_ - column));
+}
+
+/// `column` is a multiple of kStrip, so that the strip is aligned as the planned one was.
+void ComplexFft::transform_strip(int column, int columns) const noexcept {
+  fftwf_execute_dft((columns == kStrip ? along_strip_ : along_rest_).get(), raw(middle_.get() + column),
+                    raw(strip_.get()));
+  for (int row = 0; row < rows_; ++row)
+    for (int i = 0; i < columns; ++i) data_[at(row, columns_, column + i)] = strip_[at(i, strip_pitch(), row)];
+}
 
 RealFft::RealFft(int rows, int columns, FftPlanning planning)
     : real_(fft_reals(area(rows, columns))), spectrum_(fft_complexes(area(rows, columns / 2 + 1))) {

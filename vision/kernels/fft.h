@@ -31,7 +31,8 @@ FftBuffer<float> fft_reals(std::size_t count);
 FftBuffer<std::complex<float>> fft_complexes(std::size_t count);
 
 /// In-place complex transform, exp(-j...), not normalised. Shape: rows x columns, row-major; rows = 1 is a 1-D
-/// transform.
+/// transform. Columns go in strips through a buffer of its own: FFTW's plans that do so take theirs from the heap at
+/// every execution, and its plans that do not are up to twice as slow.
 class ComplexFft {
  public:
   ComplexFft() = default;
@@ -42,8 +43,14 @@ class ComplexFft {
   void execute() const WASP_REALTIME;
 
  private:
-  FftBuffer<std::complex<float>> data_;
-  std::unique_ptr<fftwf_plan_s, detail::FftFree> plan_;
+  using Plan = std::unique_ptr<fftwf_plan_s, detail::FftFree>;
+  [[nodiscard]] Plan plan_strip(int columns, unsigned flags) const;
+  void transform_strip(int column, int columns) const WASP_REALTIME;
+  [[nodiscard]] int strip_pitch() const WASP_REALTIME { return rows_ + 8; }
+
+  int rows_ = 0, columns_ = 0;
+  FftBuffer<std::complex<float>> data_, middle_, strip_;  ///< between the passes; columns of a strip, one after another
+  Plan along_rows_, along_strip_, along_rest_;
 };
 
 /// Real images to half spectra and back, not normalised. Real: rows x columns; spectrum: rows x (columns / 2 + 1).
