@@ -95,6 +95,9 @@ TEST(LogPolar, VectorsEqualTheScalarFormToTheBitOnEveryTarget) {
           ASSERT_TRUE(map.transform(p.view(), fast.data()));
           EXPECT_EQ(fast, plain) << w << " " << radii;
         });
+        const RemapTable::Near& near = map.forward_table().near;
+        EXPECT_EQ(near.columns % 32, 0);
+        EXPECT_GE(near.columns, radii == 256 ? 128 : 0);  // most columns are near the fovea
       }
 }
 

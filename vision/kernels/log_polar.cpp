@@ -67,7 +67,9 @@ LogPolarMap::LogPolarMap(const LogPolarParams& params, int width_px, int height_
   geometry_ = log_polar_geometry(params, width_px, height_px, fovea_x_px, fovea_y_px);
   backward_.reset(width_px, height_px, params.radii, params.angles + 1, params.radii);
   fill_forward();
+  forward_.finish();
   fill_backward(width_px, height_px);
+  backward_.finish();
   wrapped_.resize(static_cast<std::size_t>(params.radii) * static_cast<std::size_t>(params.angles + 1));
 }
 

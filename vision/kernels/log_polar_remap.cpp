@@ -28,6 +28,11 @@ inline std::uint16_t remap_pair(const std::uint8_t* p) noexcept {
 inline std::uint8_t remap_pixel(const std::uint8_t* p, std::ptrdiff_t stride, std::uint16_t fractions) noexcept {
   return remap_blend(remap_pair(p), remap_pair(p + stride), fractions);
 }
+/// Whether the near columns of this row are all covered, and so done beforehand.
+inline bool has_near(const RemapTable& table, int v) noexcept {
+  const auto [begin, end] = table.rows[static_cast<std::size_t>(v)];
+  return table.near.columns > 0 && begin == 0 && end >= table.near.columns;
+}
 }  // namespace wasp::vision
 #endif
 
@@ -54,52 +59,145 @@ HWY_INLINE void fetch(const std::uint8_t* source, std::ptrdiff_t stride, const s
   }
 }
 
-#if HWY_TARGET == HWY_SCALAR
-HWY_INLINE void blend(const Pairs& pairs, const std::uint16_t* fractions, int n, std::uint8_t* out) {
-  for (int i = 0; i < n; ++i) out[i] = remap_blend(pairs.upper[i], pairs.lower[i], fractions[i]);
-}
-#else
-/// `n` is a multiple of kBlock.
-HWY_INLINE void blend(const Pairs& pairs, const std::uint16_t* fractions, int n, std::uint8_t* out) {
-  constexpr int kBits = kRemapFractionBits;
-  const hn::CappedTag<std::int16_t, kBlock> d16;
-  const hn::RebindToUnsigned<decltype(d16)> du16;
-  const hn::Rebind<std::uint8_t, decltype(d16)> d8;
-  const auto low_byte = hn::Set(du16, std::uint16_t{0xff});
-  const auto half = hn::Set(d16, std::int16_t{1 << (kBits - 1)});
-  const auto across = [&](const std::uint16_t* pair, auto fx) {
-    const auto both = hn::Load(du16, pair);
-    const auto left = hn::BitCast(d16, hn::And(both, low_byte));
-    const auto right = hn::BitCast(d16, hn::ShiftRight<8>(both));
-    return hn::Add(hn::ShiftLeft<kBits>(left), hn::Mul(hn::Sub(right, left), fx));
-  };
-  for (int i = 0; i < n; i += static_cast<int>(hn::Lanes(d16))) {
-    const auto fraction = hn::LoadU(du16, fractions + i);
-    const auto fx = hn::BitCast(d16, hn::And(fraction, low_byte));
-    const auto fy = hn::BitCast(d16, hn::ShiftLeft<15 - kBits>(hn::ShiftRight<8>(fraction)));
-    const auto top = across(pairs.upper + i, fx), bottom = across(pairs.lower + i, fx);
-    const auto sum = hn::Add(top, hn::MulFixedPoint15(hn::Sub(bottom, top), fy));
-    hn::StoreU(hn::DemoteTo(d8, hn::ShiftRight<kBits>(hn::Add(sum, half))), d8, out + i);
-  }
-}
-#endif
+const hn::CappedTag<std::int16_t, kBlock> kShorts;
+const hn::RebindToUnsigned<decltype(kShorts)> kWords;
+using Shorts = hn::Vec<decltype(kShorts)>;
+using Words = hn::Vec<decltype(kWords)>;
 
-void remap_row(const std::uint8_t* source, std::ptrdiff_t stride, const std::uint32_t* offsets,
-               const std::uint16_t* fractions, int n, std::uint8_t* out) {
-  Pairs pairs;
+HWY_INLINE Shorts low_bytes(Words pairs) {
+  return hn::BitCast(kShorts, hn::And(pairs, hn::Set(kWords, std::uint16_t{0xff})));
+}
+HWY_INLINE Shorts high_bytes(Words pairs) { return hn::BitCast(kShorts, hn::ShiftRight<8>(pairs)); }
+
+/// Blends one vector of pixels from their neighbours: upper left, upper right, lower left, lower right.
+HWY_INLINE void blend(Shorts ul, Shorts ur, Shorts ll, Shorts lr, const std::uint16_t* fractions, std::uint8_t* out) {
+  constexpr int kBits = kRemapFractionBits;
+  const hn::Rebind<std::uint8_t, decltype(kShorts)> d8;
+  const Words fraction = hn::LoadU(kWords, fractions);
+  const Shorts fx = low_bytes(fraction);
+  const Shorts fy = hn::BitCast(kShorts, hn::ShiftLeft<15 - kBits>(hn::ShiftRight<8>(fraction)));
+  const auto across = [&fx](Shorts left, Shorts right)
+                          HWY_ATTR { return hn::Add(hn::ShiftLeft<kBits>(left), hn::Mul(hn::Sub(right, left), fx)); };
+  const Shorts top = across(ul, ur), bottom = across(ll, lr);
+  const Shorts sum = hn::Add(top, hn::MulFixedPoint15(hn::Sub(bottom, top), fy));
+  const Shorts half = hn::Set(kShorts, std::int16_t{1 << (kBits - 1)});
+  hn::StoreU(hn::DemoteTo(d8, hn::ShiftRight<kBits>(hn::Add(sum, half))), d8, out);
+}
+
+/// Left pair and right pair of each pixel of the near columns.
+struct Fours {
+  alignas(64) std::uint16_t both[2 * kChunk];
+};
+
+/// Some pixels of one output row, a multiple of kBlock.
+struct Piece {
+  const std::uint16_t* fractions = nullptr;
+  std::uint8_t* out = nullptr;
+  int n = 0;
+};
+
+HWY_INLINE void blend(const Pairs& pairs, const Piece& piece) {
+  for (int i = 0; i < piece.n; i += static_cast<int>(hn::Lanes(kShorts))) {
+    const Words upper = hn::Load(kWords, pairs.upper + i), lower = hn::Load(kWords, pairs.lower + i);
+    blend(low_bytes(upper), high_bytes(upper), low_bytes(lower), high_bytes(lower), piece.fractions + i, piece.out + i);
+  }
+}
+HWY_INLINE void blend(const Fours& fours, const Piece& piece) {
+  for (int i = 0; i < piece.n; i += static_cast<int>(hn::Lanes(kShorts))) {
+    Words left, right;
+    hn::LoadInterleaved2(kWords, fours.both + 2 * i, left, right);
+    blend(low_bytes(left), low_bytes(right), high_bytes(left), high_bytes(right), piece.fractions + i, piece.out + i);
+  }
+}
+
+/// Every piece is fetched before the piece before it is blended: by then its stores have left for the cache.
+template <class Fetched>
+class Pipeline {
+ public:
+  template <class Fetch>
+  HWY_INLINE void push(const Piece& piece, const Fetch& fetch) {
+    fetch(fetched_[turn_]);
+    turn_ ^= 1;
+    flush();
+    waiting_ = piece;
+  }
+  HWY_INLINE void flush() {
+    blend(fetched_[turn_], waiting_);
+    waiting_.n = 0;
+  }
+  HWY_INLINE void finish() {
+    turn_ ^= 1;
+    flush();
+  }
+
+ private:
+  Fetched fetched_[2];
+  Piece waiting_;
+  int turn_ = 0;
+};
+
+/// All columns of all rows, without the near ones where `near_done`.
+void far_columns(const RemapTable& table, const GrayView& source, std::uint8_t* out, int out_stride, bool near_done) {
+  Pipeline<Pairs> pipeline;
+  for (int v = 0; v < table.height_px; ++v) {
+    const auto [first, end] = table.rows[static_cast<std::size_t>(v)];
+    const int begin = near_done && has_near(table, v) ? table.near.columns : first;
+    const std::ptrdiff_t row = static_cast<std::ptrdiff_t>(v) * table.width_px;
+    const std::uint32_t* const offsets = table.offsets.data() + row;
+    const std::uint16_t* const fractions = table.fractions.data() + row;
+    std::uint8_t* const line = out + static_cast<std::ptrdiff_t>(v) * out_stride;
+    const auto push = [&](int u, int n) HWY_ATTR {
+      pipeline.push({fractions + u, line + u, n},
+                    [&](Pairs& pairs) HWY_ATTR { fetch(source.data, source.stride_px, offsets + u, n, pairs); });
+    };
+    if (end - begin < kBlock) {
+      for (int u = begin; u < end; ++u) line[u] = remap_pixel(source.data + offsets[u], source.stride_px, fractions[u]);
+      continue;
+    }
+    for (int u = begin, n = 0; u < end; u += n) {
+      u = u < end - kBlock ? u : end - kBlock;  // the last block overlaps the one before
+      n = (end - u < kChunk ? end - u : kChunk) / kBlock * kBlock;
+      push(u, n);
+    }
+  }
+  pipeline.finish();
+}
+
+/// The near columns of rows begin ... end-1 from `window`, which has pairs (pixel, pixel below).
+void near_columns(const RemapTable& table, const std::uint16_t* window, int begin, int end, std::uint8_t* out,
+                  int out_stride) {
+  Pipeline<Fours> pipeline;
+  for (int v = begin; v < end; ++v) {
+    if (!has_near(table, v)) continue;
+    const std::uint16_t* const offsets =
+        table.near.offsets.data() + static_cast<std::ptrdiff_t>(v) * table.near.columns;
+    const std::uint16_t* const fractions = table.fractions.data() + static_cast<std::ptrdiff_t>(v) * table.width_px;
+    std::uint8_t* const line = out + static_cast<std::ptrdiff_t>(v) * out_stride;
+    for (int u = 0, n = 0; u < table.near.columns; u += n) {
+      n = table.near.columns - u < kChunk ? table.near.columns - u : kChunk;
+      pipeline.push({fractions + u, line + u, n}, [&](Fours& fours) HWY_ATTR {
+#pragma GCC unroll 8
+        for (int i = 0; i < n; ++i) {
+          std::uint32_t four;
+          __builtin_memcpy(&four, window + offsets[u + i], sizeof four);
+          asm("" : "+r"(four));  // or gcc puts a vector together in registers, which takes half as long again
+          __builtin_memcpy(fours.both + 2 * i, &four, sizeof four);
+        }
+      });
+    }
+  }
+  pipeline.finish();
+}
+
+/// Pairs (upper, lower) of two rows of bytes; either has `n`.
+void pair_rows(const std::uint8_t* upper, const std::uint8_t* lower, int n, std::uint16_t* out) {
+  const hn::CappedTag<std::uint8_t, 2 * kBlock> d;
+  const int lanes = static_cast<int>(hn::Lanes(d));
   int i = 0;
-  for (int chunk = 0; i + kBlock <= n; i += chunk) {
-    chunk = (n - i < kChunk ? n - i : kChunk) / kBlock * kBlock;
-    fetch(source, stride, offsets + i, chunk, pairs);
-    blend(pairs, fractions + i, chunk, out + i);
-  }
-  if (i == n) return;
-  if (n < kBlock) {
-    for (; i < n; ++i) out[i] = remap_pixel(source + offsets[i], stride, fractions[i]);
-    return;
-  }
-  fetch(source, stride, offsets + n - kBlock, kBlock, pairs);  // the last block overlaps the one before
-  blend(pairs, fractions + n - kBlock, kBlock, out + n - kBlock);
+  for (; i + lanes <= n; i += lanes)
+    hn::StoreInterleaved2(hn::LoadU(d, upper + i), hn::LoadU(d, lower + i), d,
+                          reinterpret_cast<std::uint8_t*>(out + i));
+  for (; i < n; ++i) out[i] = static_cast<std::uint16_t>(upper[i] | lower[i] << 8);
 }
 
 const char* target_name() { return hwy::TargetName(HWY_TARGET); }
@@ -110,6 +208,7 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <stdexcept>
@@ -118,36 +217,51 @@ HWY_AFTER_NAMESPACE();
 namespace wasp::vision {
 namespace {
 
-HWY_EXPORT(remap_row);
+HWY_EXPORT(far_columns);
+HWY_EXPORT(near_columns);
+HWY_EXPORT(pair_rows);
 HWY_EXPORT(target_name);
 
-/// Runs `row(source, stride, offsets, fractions, n, out)` over the covered part of every output row, clears the rest.
-template <class RowFunction>
-bool for_rows(const RemapTable& table, const GrayView& source, std::uint8_t* out, int out_stride, RowFunction row) {
-  if (!table.fits(source) || out == nullptr || out_stride < table.width_px) return false;
+/// Zeros what the table does not cover.
+void clear_rest(const RemapTable& table, std::uint8_t* out, int out_stride) noexcept {
   for (int v = 0; v < table.height_px; ++v) {
     const auto [begin, end] = table.rows[static_cast<std::size_t>(v)];
-    const std::ptrdiff_t first = static_cast<std::ptrdiff_t>(v) * table.width_px + begin;
     std::uint8_t* const line = out + static_cast<std::ptrdiff_t>(v) * out_stride;
-    std::memset(line, 0, static_cast<std::size_t>(begin));
-    row(source.data, source.stride_px, table.offsets.data() + first, table.fractions.data() + first, end - begin,
-        line + begin);
-    std::memset(line + end, 0, static_cast<std::size_t>(table.width_px - end));
+    if (begin > 0) std::memset(line, 0, static_cast<std::size_t>(begin));
+    if (end < table.width_px) std::memset(line + end, 0, static_cast<std::size_t>(table.width_px - end));
   }
-  return true;
 }
 
-/// Asks for the whole source in the order memory likes best: rays ask in the worst one, and a frame just written by
-/// another core, or fallen out of the caches, would stall each of them.
-void prefetch(const GrayView& source) noexcept {
+bool usable(const RemapTable& table, const GrayView& source, const std::uint8_t* out, int out_stride) noexcept {
+  return table.fits(source) && out != nullptr && out_stride >= table.width_px;
+}
+
+/// Asks for what is read of rows begin ... end-1 of the source in the order memory likes best: rays ask in the worst
+/// one, and a frame just written by another core, or fallen out of the caches, would stall each of them.
+void prefetch(const RemapTable& table, const GrayView& source, int begin, int end) noexcept {
   constexpr int kLine = 64;
-  for (int v = 0; v < source.height_px; ++v)
-    for (int u = 0; u < source.width_px; u += kLine) __builtin_prefetch(source.row(v) + u, 0, 2);
+  for (int v = begin; v < end; ++v) {
+    const auto [first, last] = table.source_rows[static_cast<std::size_t>(v)];
+    for (int u = first; u < last + kLine; u += kLine)
+      __builtin_prefetch(source.row(v) + std::min(u, source.width_px - 1), 0, 2);
+  }
 }
 
-void remap_row_scalar(const std::uint8_t* source, std::ptrdiff_t stride, const std::uint32_t* offsets,
-                      const std::uint16_t* fractions, int n, std::uint8_t* out) noexcept {
-  for (int i = 0; i < n; ++i) out[i] = remap_pixel(source + offsets[i], stride, fractions[i]);
+/// The near columns of all rows; meanwhile the rest of the source comes nearer.
+void remap_near(const RemapTable& table, const GrayView& source, std::uint8_t* out, int out_stride) noexcept {
+  const RemapTable::Near& near = table.near;
+  alignas(64) std::array<std::uint16_t, kRemapNearPixels> window;
+  for (int v = 0; v < near.height_px; ++v) {
+    const std::uint8_t* upper = source.row(near.y_px + v) + near.x_px;
+    HWY_DYNAMIC_DISPATCH(pair_rows)
+    (upper, upper + source.stride_px, near.width_px, &window[static_cast<std::size_t>(v * near.width_px)]);
+  }
+  constexpr int kSlice = 16;  // output rows between two helpings of the source
+  for (int v = 0; v < table.height_px; v += kSlice) {
+    const int end = std::min(v + kSlice, table.height_px);
+    prefetch(table, source, v * source.height_px / table.height_px, end * source.height_px / table.height_px);
+    HWY_DYNAMIC_DISPATCH(near_columns)(table, window.data(), v, end, out, out_stride);
+  }
 }
 
 }  // namespace
@@ -180,20 +294,82 @@ void RemapTable::set(int column, int row, double x_px, double y_px) {
   fractions[at] = static_cast<std::uint16_t>((x % kOne) | ((y % kOne) << 8));
 }
 
+RemapTable::Corner RemapTable::upper_left(std::size_t row, int column) const {
+  const auto at = row * static_cast<std::size_t>(width_px) + static_cast<std::size_t>(column);
+  const auto offset = static_cast<int>(offsets[at]);
+  return {offset % source_stride_px, offset / source_stride_px};
+}
+
+void RemapTable::finish() {
+  find_source_rows();
+  find_near();
+}
+
+void RemapTable::find_source_rows() {
+  source_rows.assign(static_cast<std::size_t>(source_height_px), {source_width_px, 0});
+  for (std::size_t v = 0; v < rows.size(); ++v)
+    for (int u = rows[v].begin; u < rows[v].end; ++u) {
+      const auto [x, y] = upper_left(v, u);
+      for (const int read : {y, y + 1}) {
+        Row& row = source_rows[static_cast<std::size_t>(read)];
+        row = {std::min(row.begin, x), std::max(row.end, x + 2)};
+      }
+    }
+}
+
+void RemapTable::find_near() {
+  constexpr int kStep = 32;
+  int left = source_width_px, top = source_height_px, right = 0, bottom = 0;  // of upper left neighbours
+  near = {};
+  if (std::any_of(rows.begin(), rows.end(), [](const Row& row) { return row.begin > 0; })) return;
+  for (int columns = kStep; columns <= width_px; columns += kStep) {
+    for (std::size_t v = 0; v < rows.size(); ++v)
+      for (int u = std::max(columns - kStep, rows[v].begin); u < std::min(columns, rows[v].end); ++u) {
+        const auto [x, y] = upper_left(v, u);
+        left = std::min(left, x), right = std::max(right, x), top = std::min(top, y), bottom = std::max(bottom, y);
+      }
+    const int width = right - left + 2, height = bottom - top + 1;
+    if (right < left || width * height > kRemapNearPixels) break;
+    near = {.x_px = left, .y_px = top, .width_px = width, .height_px = height, .columns = columns, .offsets = {}};
+  }
+  for (std::size_t v = 0; v < rows.size(); ++v)
+    for (int u = 0; u < near.columns; ++u) {
+      const auto [x, y] = upper_left(v, u);
+      const bool covered = u >= rows[v].begin && u < rows[v].end;
+      near.offsets.push_back(static_cast<std::uint16_t>(covered ? (y - near.y_px) * near.width_px + x - near.x_px : 0));
+    }
+}
+
 bool RemapTable::fits(const GrayView& source) const noexcept {
   return !offsets.empty() && source.valid() && source.width_px == source_width_px &&
          source.height_px == source_height_px && source.stride_px == source_stride_px;
 }
 
 bool remap(const RemapTable& table, const GrayView& source, std::uint8_t* out, int out_stride) noexcept {
-  if (table.fits(source)) prefetch(source);
-  return for_rows(table, source, out, out_stride, [](auto... row) noexcept {
-    HWY_DYNAMIC_DISPATCH(remap_row)(row...);
-  });
+  if (!usable(table, source, out, out_stride)) return false;
+  const bool near = table.near.columns > 0;
+  if (near)
+    remap_near(table, source, out, out_stride);
+  else
+    prefetch(table, source, 0, source.height_px);
+  HWY_DYNAMIC_DISPATCH(far_columns)(table, source, out, out_stride, near);
+  clear_rest(table, out, out_stride);
+  return true;
 }
 
 bool remap_scalar(const RemapTable& table, const GrayView& source, std::uint8_t* out, int out_stride) noexcept {
-  return for_rows(table, source, out, out_stride, [](auto... row) noexcept { remap_row_scalar(row...); });
+  if (!usable(table, source, out, out_stride)) return false;
+  clear_rest(table, out, out_stride);
+  for (int v = 0; v < table.height_px; ++v) {
+    const auto [begin, end] = table.rows[static_cast<std::size_t>(v)];
+    for (int u = begin; u < end; ++u) {
+      const auto at =
+          static_cast<std::size_t>(v) * static_cast<std::size_t>(table.width_px) + static_cast<std::size_t>(u);
+      out[static_cast<std::ptrdiff_t>(v) * out_stride + u] =
+          remap_pixel(source.data + table.offsets[at], source.stride_px, table.fractions[at]);
+    }
+  }
+  return true;
 }
 
 const char* remap_target() noexcept { return HWY_DYNAMIC_DISPATCH(target_name)(); }

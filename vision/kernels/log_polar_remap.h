@@ -13,7 +13,8 @@
 namespace wasp::vision {
 
 inline constexpr int kRemapFractionBits = 7;
-inline constexpr int kRemapMaxSize = 8192;  ///< of any width, height or stride
+inline constexpr int kRemapNearPixels = 16000;  ///< of the window: 32 kB on the stack while remapping
+inline constexpr int kRemapMaxSize = 8192;      ///< of any width, height or stride
 
 /// Where each output pixel comes from. Output rows are covered from `begin` to `end`; the rest is outside the source
 /// and becomes 0.
@@ -27,13 +28,35 @@ struct RemapTable {
   std::vector<std::uint16_t> fractions;  ///< right (low byte) and down (high byte) of it, 0 ... 127
   std::vector<Row> rows;
 
+  std::vector<Row> source_rows;  ///< what is read of each row of the source
+
+  /// The first `columns` of every row come from a small window of the source about one point (a log-polar map has most
+  /// of its columns near the fovea). There the window's rows are interleaved first, (pixel, pixel below), so that one
+  /// load fetches all four neighbours.
+  struct Near {
+    int x_px = 0, y_px = 0, width_px = 0, height_px = 0;  ///< window
+    int columns = 0;                                      ///< 0: none
+    std::vector<std::uint16_t> offsets;                   ///< of the upper left neighbour in the window, row-major
+  } near;
+
   /// Sizes an empty table (nothing covered). Throws std::invalid_argument for sizes below 2 x 2 or above
   /// kRemapMaxSize. Realtime-safe: no.
   void reset(int out_width_px, int out_height_px, int source_width, int source_height, int source_stride);
   /// Sets one output pixel to the source point (x, y), which is clamped to the source. Realtime-safe: no.
   void set(int column, int row, double x_px, double y_px);
+  /// To be called once all pixels are set: finds what is read of the source, and the near columns, if there are any.
+  /// Realtime-safe: no.
+  void finish();
   /// Whether `source` is what the table was made for.
   [[nodiscard]] bool fits(const GrayView& source) const WASP_REALTIME;
+
+ private:
+  struct Corner {
+    int x_px, y_px;
+  };
+  [[nodiscard]] Corner upper_left(std::size_t row, int column) const;
+  void find_source_rows();
+  void find_near();
 };
 
 /// Fills `out` (height_px rows of width_px, `out_stride` apart) from `source`. False, and nothing written, when the
