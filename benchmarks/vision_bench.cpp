@@ -64,14 +64,17 @@ std::int64_t timed(const std::function<void(int)>& call, int input) {
 }
 
 /// Calls over the inputs from `first` on until `budget_ns` is spent, at least `least`; returns their times.
-std::vector<std::int64_t> run_calls(const std::function<void(int)>& call, int inputs, int first, int least,
+std::vector<std::int64_t> run_calls(const VisionRow& row, const std::function<void(int)>& call, int first, int least,
                                     DurationNs budget_ns) {
+  const int inputs = static_cast<int>(row.inputs.size());
   std::vector<std::int64_t> times;
   times.reserve(kMaxBlockCalls);
   call(first % inputs);  // warms the caches and whatever the callee keeps
   const TimeNs end = rt::now() + budget_ns;
-  for (int i = 0; i < kMaxBlockCalls && (i < least || rt::now() < end); ++i)
+  for (int i = 0; i < kMaxBlockCalls && (i < least || rt::now() < end); ++i) {
+    if (row.fresh) row.fresh((first + i) % inputs);
     times.push_back(timed(call, (first + i) % inputs));
+  }
   return times;
 }
 
@@ -142,10 +145,10 @@ Outcome measure(const VisionRow& row, double seconds) {
     std::vector<std::vector<std::int64_t>> times(outcome.tracks.size());
     int calls = 3;
     for (std::size_t i = row.peers.size(); i > 0; --i) {
-      times[i] = run_calls(row.peers[i - 1].call, inputs, first, 3, from_seconds(share));
+      times[i] = run_calls(row, row.peers[i - 1].call, first, 3, from_seconds(share));
       calls = std::max(calls, static_cast<int>(times[i].size()));
     }
-    times[0] = run_calls(row.ours, inputs, first, calls, 0);
+    times[0] = run_calls(row, row.ours, first, calls, 0);
     for (std::size_t i = 0; i < times.size(); ++i) add_block(outcome.tracks[i], row, first, times[i], times[0]);
   }
   run_tail(row, outcome);
@@ -154,7 +157,8 @@ Outcome measure(const VisionRow& row, double seconds) {
 
 void report_row(Report& report, const VisionRow& row, const Outcome& outcome) {
   const Track& ours = outcome.tracks[0];
-  report.note(row.name, row.what);
+  report.note(row.name,
+              row.what + (row.fresh ? "; ratios on frames just read, times on frames fallen out of the caches" : ""));
   report.row(row.name + ".wasp", quantiles(ours.all_ns));
   for (std::size_t i = 0; i < row.peers.size(); ++i) {
     const VisionPeer& peer = row.peers[i];

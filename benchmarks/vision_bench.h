@@ -28,10 +28,23 @@ struct VisionRow {
   std::function<void(int)> ours;
   std::vector<VisionPeer> peers;
   std::function<int(int)> trips = {};  ///< trip count of input i where time depends on the data; empty where it cannot
+  /// For the ratios only: called before every call of either side, outside its time. Reads the frame, which leaves it
+  /// as a driver does that has just written it; without it, and in p99.9 and max, frames have long fallen out of the
+  /// caches.
+  std::function<void(int)> fresh = {};
   /// Inputs the bars are about; the ratio over the others is a figure of its own. Empty: all. p99.9 and max: all.
   std::function<bool(int)> judged = {};
   std::string bound = {};  ///< what bounds the time: "fixed trip counts", "at most 3 x 16 iterations"
 };
+
+/// Reads all of a frame.
+template <class T>
+inline void read_through(const std::vector<T>& pixels) {
+  constexpr std::size_t kLine = 64 / sizeof(T);
+  T sum = 0;
+  for (std::size_t i = 0; i < pixels.size(); i += kLine) sum = static_cast<T>(sum + pixels[i]);
+  asm volatile("" : : "r"(static_cast<unsigned>(sum)));
+}
 
 /// Keeps the compiler from dropping a result.
 template <class T>

@@ -48,6 +48,7 @@ VisionRow sampled_row(const VisionData& data, const std::shared_ptr<Buffers>& bu
                 .peers = {opencv(data, buffers, bar)},
                 .trips = [samples](int) { return static_cast<int>(samples->pixels.size()); },
                 .bound = "trips are windows; one network, no branch on the data"};
+  row.fresh = [&data](int i) { read_through(data.depth[static_cast<std::size_t>(i)].pixels); };
   row.ours = [&data, samples](int i) {
     vision::median_5x5_at(data.depth[static_cast<std::size_t>(i)].view(), samples->pixels, 1, samples->mm);
     keep(samples->mm);
@@ -67,6 +68,7 @@ std::vector<VisionRow> depth_median_rows(const VisionData& data) {
                   .peers = {opencv(data, buffers, 4.4)},
                   .trips = [](int) { return kVisionWidth * kVisionHeight; },
                   .bound = "trips are pixels; one network, no branch on the data"};
+  dense.fresh = [&data](int i) { read_through(data.depth[static_cast<std::size_t>(i)].pixels); };
   dense.ours = [&data, buffers](int i) {
     vision::median_5x5(data.depth[static_cast<std::size_t>(i)].view(), buffers->dense.data(), kVisionWidth);
     keep(buffers->dense);

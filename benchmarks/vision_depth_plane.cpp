@@ -38,6 +38,7 @@ VisionRow plane_row(const VisionData& data, bool cold) {
     if (cold) (*states)[at].warm = false;
     keep(vision::estimate_floor({}, data.depth_intrinsics, data.depth[at].view(), prior(), (*states)[at]));
   };
+  row.fresh = [&data](int i) { read_through(data.depth[static_cast<std::size_t>(i)].pixels); };
   row.trips = [&data, states, cold](int i) {
     const auto at = static_cast<std::size_t>(i);
     if (cold) (*states)[at].warm = false;

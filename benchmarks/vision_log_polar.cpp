@@ -44,6 +44,7 @@ std::vector<VisionRow> log_polar_rows(const VisionData& data) {
   row.what = std::string("256x256 log-polar map of 640x480, bilinear, ") + vision::remap_target();
   row.floor_us = 36;
   row.inputs = data.names(data.gray);
+  row.fresh = [&data](int i) { read_through(data.gray[static_cast<std::size_t>(i)].pixels); };
   row.trips = [](int) { return kSide * kSide; };
   row.bound = "trips are pixels of the map, no branch on the data";
   row.ours = [=](int i) {
