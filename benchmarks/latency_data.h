@@ -33,8 +33,9 @@ struct PairSetup {
   int index = 0;  ///< within its load
   int core = 1;
   int control_priority = 80, reference_priority = 81, witness_priority = 90;
-  DurationNs reference_lead_ns = 0;  ///< the reference's grid minus control's
-  bool cyclictest = true;            ///< false: a loop of our own stands in for it
+  DurationNs reference_lead_ns =
+      0;                   ///< the reference's grid behind control's in one half of the pair, before it in the other
+  bool cyclictest = true;  ///< false: a loop of our own stands in for it
   bool real_time = true;
 };
 
@@ -43,10 +44,10 @@ struct PairData {
   FlightTimes times;
   std::vector<Tick> ticks;
   std::vector<std::string> behaviours;
-  std::vector<std::vector<SeenCue>> cues;  ///< by behaviour
-  std::vector<tools::Wakeup> reference;    ///< cyclictest
-  std::vector<tools::Wakeup> witness;      ///< our own loop, above everybody, in the middle of the deadline
-  std::size_t lost = 0;                    ///< ticks and cues the observer was too late for
+  std::vector<std::vector<SeenCue>> cues;             ///< by behaviour
+  std::vector<std::vector<tools::Wakeup>> reference;  ///< cyclictest, by half of the pair
+  std::vector<tools::Wakeup> witness;                 ///< our own loop, above everybody, in the middle of the deadline
+  std::size_t lost = 0;                               ///< ticks and cues the observer was too late for
   tools::RunSummary run;
 };
 

@@ -18,6 +18,12 @@ double median_of(const std::vector<const PairFigures*>& pairs, double PairFigure
   return tools::median(std::move(values));
 }
 
+void add(tools::Population& all, const tools::Population& part) {
+  all.late_ns.insert(all.late_ns.end(), part.late_ns.begin(), part.late_ns.end());
+  all.skipped += part.skipped;
+  all.unobserved += part.unobserved;
+}
+
 tools::Result barred(const std::string& name, double value, double bar, bool binding) {
   return binding ? tools::at_most(name, value, "x", bar) : tools::Result{name, value, "x", "", true};
 }
@@ -30,11 +36,17 @@ PairFigures judge_pair(const PairData& pair) {
   f.lost = pair.lost;
   f.minor_faults = pair.run.minor_faults;
   f.major_faults = pair.run.major_faults;
-  if (pair.reference.empty()) return f;
-  const auto ticks = ticks_between(pair.ticks, pair.reference.front().due_at_ns - pair.times.period_ns / 2,
-                                   pair.reference.back().due_at_ns + pair.times.period_ns / 2);
-  f.ours = tools::whole_population(control_wakeups(ticks), pair.times.period_ns);
-  f.theirs = tools::whole_population(pair.reference, pair.times.period_ns);
+  std::vector<Tick> ticks;
+  for (const auto& half : pair.reference) {
+    if (half.empty()) continue;
+    const DurationNs margin_ns = pair.times.period_ns / 2;
+    const auto part = ticks_between(pair.ticks, half.front().due_at_ns - margin_ns, half.back().due_at_ns + margin_ns);
+    add(f.ours, tools::whole_population(control_wakeups(part), pair.times.period_ns));
+    add(f.theirs, tools::whole_population(half, pair.times.period_ns));
+    const auto missed = find_misses(part, pair.times, trusted_references(pair));
+    f.misses.insert(f.misses.end(), missed.begin(), missed.end());
+    ticks.insert(ticks.end(), part.begin(), part.end());
+  }
   f.q_ours = tools::quantiles(f.ours.late_ns);
   f.q_theirs = tools::quantiles(f.theirs.late_ns);
   f.q_witness = tools::quantiles(tools::whole_population(pair.witness, pair.times.period_ns).late_ns);
@@ -43,7 +55,6 @@ PairFigures judge_pair(const PairData& pair) {
   f.ratio_p999 = ratio(f.q_ours.p999, f.q_theirs.p999);
   f.ratio_max = ratio(f.q_ours.max, f.q_theirs.max);
   f.ratio_max_allowed = ratio(f.q_ours.max - kAllowance_ns, f.q_theirs.max);
-  f.misses = find_misses(ticks, pair.times, trusted_references(pair));
   f.judgeable = f.q_theirs.count > 0 && f.q_theirs.max < static_cast<double>(pair.times.slack_ns());
   std::vector<std::vector<SeenCue>> cues;
   for (std::size_t i = 0; i < pair.cues.size(); ++i) {

@@ -19,13 +19,19 @@ void add_skipped(const Tick& tick, const Tick& next, const FlightTimes& times,
   const TimeNs first = tick.value.due_at_ns;
   for (TimeNs due = first + times.period_ns; due < next.value.due_at_ns - times.period_ns / 2; due += times.period_ns) {
     if (back_at <= due) continue;
-    Miss m{due, back_at - due, true, stalled_ns(trusted, first, back_at), false};
+    Miss m{due, back_at - due, true, stalled_ns(trusted, first, back_at)};
+    m.woken_late = tick.value.released_at_ns > due;
     m.host_noise = back_at - m.host_ns <= due;  // without the stalls it would have been back in time
     misses.push_back(m);
   }
 }
 
 }  // namespace
+
+const char* Miss::cause() const {
+  if (host_noise) return "host noise";
+  return woken_late ? "not the host: another real-time thread held the core" : "control's own work";
+}
 
 DurationNs stalled_ns(const std::vector<const std::vector<tools::Wakeup>*>& references, TimeNs from_ns, TimeNs to_ns) {
   std::vector<std::pair<TimeNs, TimeNs>> spans;
@@ -51,7 +57,8 @@ std::vector<Miss> find_misses(const std::vector<Tick>& ticks, const FlightTimes&
     const Tick& t = ticks[i];
     if (late(t, times)) {
       const TimeNs end = t.value.written_at_ns != 0 ? t.value.written_at_ns : std::max(t.at_ns, t.value.released_at_ns);
-      Miss m{t.value.due_at_ns, end - t.value.due_at_ns, false, stalled_ns(trusted, t.value.due_at_ns, end), false};
+      Miss m{t.value.due_at_ns, end - t.value.due_at_ns, false, stalled_ns(trusted, t.value.due_at_ns, end)};
+      m.woken_late = t.value.released_at_ns - t.value.due_at_ns > times.deadline_ns;
       m.host_noise = t.value.written_at_ns != 0 && m.late_ns - m.host_ns <= times.deadline_ns;
       misses.push_back(m);
     }
@@ -63,7 +70,8 @@ std::vector<Miss> find_misses(const std::vector<Tick>& ticks, const FlightTimes&
 std::vector<const std::vector<tools::Wakeup>*> trusted_references(const PairData& pair) {
   std::vector<const std::vector<tools::Wakeup>*> trusted;
   if (pair.setup.witness_priority > pair.setup.control_priority) trusted.push_back(&pair.witness);
-  if (pair.setup.reference_priority > pair.setup.control_priority) trusted.push_back(&pair.reference);
+  if (pair.setup.reference_priority > pair.setup.control_priority)
+    for (const auto& half : pair.reference) trusted.push_back(&half);
   return trusted;
 }
 

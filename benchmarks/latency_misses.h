@@ -1,6 +1,7 @@
 // Deadline misses and skipped releases, and who is to blame. A miss is host noise if the time during which a thread of
 // higher priority on the same core was itself not run explains it: had control had that time, it would have met its
-// deadline. Threads below control prove nothing, for control itself may have kept them waiting.
+// deadline. Threads below control prove nothing, for control itself may have kept them waiting. A miss that the witness
+// above did not feel, though control was not even woken, was made by another real-time thread on the core.
 #pragma once
 
 #include <string>
@@ -16,6 +17,8 @@ struct Miss {
   bool skipped = false;    ///< the release was never served
   DurationNs host_ns = 0;  ///< of that, time in which the references above control were not run either
   bool host_noise = false;
+  bool woken_late = false;                  ///< the delay lay before control ran at all
+  [[nodiscard]] const char* cause() const;  ///< in words
 };
 
 /// Time within [from, to] covered by the delays [due, due + late] of any of `references`; overlaps count once.

@@ -1,6 +1,7 @@
 #include "benchmarks/latency_pair.h"
 
 #include <algorithm>
+#include <functional>
 #include <memory>
 #include <stdexcept>
 
@@ -16,7 +17,7 @@
 namespace wasp::bench {
 namespace {
 
-constexpr DurationNs kLead = kMillisecond;
+constexpr DurationNs kLead = 250 * kMicrosecond;  // several times what a control tick takes
 constexpr DurationNs kSettle = kSecond;
 
 /// The reference: cyclictest, or where it cannot run a loop of our own in its place.
@@ -83,12 +84,6 @@ Tick newest_tick(BenchFlight& flight) {
   }
 }
 
-std::int64_t worst_of(const std::vector<Tick>& ticks) {
-  std::int64_t worst = 0;
-  for (const Tick& t : ticks) worst = std::max(worst, t.value.released_at_ns - t.value.due_at_ns);
-  return worst;
-}
-
 }  // namespace
 
 PairSetup setup_of(const std::string& load, int index, const scheduling::Config& config) {
@@ -99,9 +94,27 @@ PairSetup setup_of(const std::string& load, int index, const scheduling::Config&
   s.control_priority = config.control_thread.priority;
   s.reference_priority = s.control_priority + (index % 2 == 0 ? 1 : -1);
   s.witness_priority = std::min(98, s.control_priority + 10);
-  s.reference_lead_ns = index / 2 % 2 == 0 ? -kLead : kLead;
+  s.reference_lead_ns = kLead;
   return s;
 }
+
+namespace {
+
+/// One half of a pair: the reference beside control until it ends.
+std::vector<tools::Wakeup> run_half(PairSetup& setup, BenchFlight& flight, Load& load, DurationNs period_ns,
+                                    double seconds, TimeNs grid_ns, const std::function<void()>& tell) {
+  Reference reference(setup, period_ns, seconds, grid_ns);
+  while (reference.listen()) {
+    flight.observer().look();
+    flight.expect_alive();
+    if (!load.running()) throw std::runtime_error("stress-ng ended early (load " + setup.load + ")");
+    if (interrupted()) throw std::runtime_error("interrupted");
+    tell();
+  }
+  return reference.finish();
+}
+
+}  // namespace
 
 PairData run_pair(PairSetup setup, const LatencyOptions& options, const scheduling::Config& config,
                   const PairProgress& progress) {
@@ -114,25 +127,21 @@ PairData run_pair(PairSetup setup, const LatencyOptions& options, const scheduli
   flight.observer().forget();
   const TimeNs due = newest_tick(flight).value.due_at_ns;
   const auto witness = start_witness(setup, data.times, options.seconds, due);
-  Reference reference(setup, data.times.period_ns, options.seconds, due + setup.reference_lead_ns);
   const TimeNs start = rt::now();
   TimeNs told = start;
-  while (reference.listen()) {
-    flight.observer().look();
-    flight.expect_alive();
-    if (!load.running()) throw std::runtime_error("stress-ng ended early (load " + setup.load + ")");
-    if (interrupted()) throw std::runtime_error("interrupted");
-    if (rt::now() - told < kSecond / 2) continue;
+  const auto tell = [&] {
+    if (rt::now() - told < kSecond / 2) return;
     told = rt::now();
     const Tick* t = flight.observer().newest();
     progress(to_seconds(told - start), t == nullptr ? 0 : t->value.released_at_ns - t->value.due_at_ns);
-  }
-  data.reference = reference.finish();
+  };
+  for (const DurationNs lead : {setup.reference_lead_ns, -setup.reference_lead_ns})
+    data.reference.push_back(
+        run_half(setup, flight, load, data.times.period_ns, options.seconds / 2, due + lead, tell));
   rt::sleep_until(rt::now() + 2 * data.times.period_ns);  // the ticks around the reference's last wake-up
   data.witness = witness->finish();
   flight.observer().hand_over(data);
   data.setup = setup;
-  progress(options.seconds, worst_of(data.ticks));
   return data;
 }
 

@@ -1,7 +1,7 @@
 // One pair: a flight in the simulator, the load, cyclictest on control's core at the next priority and the same period,
-// and a witness of our own above everybody. cyclictest's grid lies 1 ms before or after control's, never on it, so that
-// both see the same moment of the machine and neither waits for the other; order and priority alternate from pair to
-// pair, and each pair is a new flight, so that no chance phase between threads decides.
+// and a witness of our own above everybody. cyclictest's grid lies 0.25 ms behind control's in one half of a pair and
+// as much before it in the other, never on it, so that both see the same moment of the machine and neither waits for
+// the other. The priority alternates from pair to pair, and each pair is a new flight: no chance phase decides.
 #pragma once
 
 #include <functional>
@@ -12,8 +12,8 @@
 
 namespace wasp::bench {
 
-/// Told now and then: seconds measured so far in this pair, and the flight's and the reference's worst wake-up [ns].
-using PairProgress = std::function<void(double seconds, std::int64_t worst_ns)>;
+/// Told now and then: seconds measured so far in this pair, and control's latest wake-up latency [ns].
+using PairProgress = std::function<void(double seconds, std::int64_t late_ns)>;
 
 /// Which order and priority pair `index` has.
 PairSetup setup_of(const std::string& load, int index, const scheduling::Config& config);

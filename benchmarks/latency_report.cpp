@@ -21,16 +21,15 @@ std::string quantiles_text(const tools::Quantiles& q) {
 }
 
 std::string setup_text(const PairSetup& s) {
-  return fmt::format("{} {} {:+.0f} ms, priority {:+d}{}", s.cyclictest ? "cyclictest" : "own reference loop",
-                     s.real_time ? "" : "SCHED_OTHER,", static_cast<double>(s.reference_lead_ns) * 1e-6,
+  return fmt::format("{} {}+-{:.2f} ms, priority {:+d}{}", s.cyclictest ? "cyclictest" : "own reference loop",
+                     s.real_time ? "" : "SCHED_OTHER, ", static_cast<double>(s.reference_lead_ns) * 1e-6,
                      s.reference_priority - s.control_priority, s.real_time ? "" : "; NOT REAL TIME");
 }
 
 std::string miss_text(const Miss& m) {
   return fmt::format("    miss at {:.3f} s: {} {}; the references above control stood still for {} of it: {}\n",
                      to_seconds(m.due_at_ns), m.skipped ? "release skipped, work over after" : "last byte after",
-                     duration_text(m.late_ns), duration_text(m.host_ns),
-                     m.host_noise ? "host noise" : "NOT host noise");
+                     duration_text(m.late_ns), duration_text(m.host_ns), m.cause());
 }
 
 /// Chains and stages of all pairs of a load together.
@@ -123,7 +122,8 @@ nlohmann::json pair_json(const PairFigures& p) {
                            {"late_ns", m.late_ns},
                            {"skipped", m.skipped},
                            {"host_ns", m.host_ns},
-                           {"host_noise", m.host_noise}});
+                           {"host_noise", m.host_noise},
+                           {"cause", m.cause()}});
   for (const auto& s : p.stages) {
     auto row = json_of(s.q);
     row["owner"] = s.owner;
