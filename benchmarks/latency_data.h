@@ -2,6 +2,7 @@
 // the references that ran beside it, all with their instants on CLOCK_MONOTONIC.
 #pragma once
 
+#include <set>
 #include <string>
 #include <vector>
 
@@ -48,6 +49,7 @@ struct PairData {
   std::vector<std::vector<tools::Wakeup>> reference;  ///< cyclictest, by half of the pair
   std::vector<tools::Wakeup> witness;                 ///< our own loop, above everybody, in the middle of the deadline
   std::size_t lost = 0;                               ///< ticks and cues the observer was too late for
+  std::set<std::string> foreign;  ///< real-time threads of others seen on the core, at control's priority or above
   tools::RunSummary run;
 };
 

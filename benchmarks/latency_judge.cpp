@@ -55,7 +55,9 @@ PairFigures judge_pair(const PairData& pair) {
   f.ratio_p999 = ratio(f.q_ours.p999, f.q_theirs.p999);
   f.ratio_max = ratio(f.q_ours.max, f.q_theirs.max);
   f.ratio_max_allowed = ratio(f.q_ours.max - kAllowance_ns, f.q_theirs.max);
-  f.judgeable = f.q_theirs.count > 0 && f.q_theirs.max < static_cast<double>(pair.times.slack_ns());
+  f.foreign = pair.foreign;
+  f.judgeable =
+      f.foreign.empty() && f.q_theirs.count > 0 && f.q_theirs.max < static_cast<double>(pair.times.slack_ns());
   std::vector<std::vector<SeenCue>> cues;
   for (std::size_t i = 0; i < pair.cues.size(); ++i) {
     f.behaviours.push_back(follow_cues(pair.behaviours[i], ticks, pair.cues[i]));

@@ -18,7 +18,9 @@ struct PairFigures {
   double ratio_p50 = 0, ratio_p99 = 0, ratio_p999 = 0, ratio_max = 0;
   double ratio_max_allowed = 0;  ///< (max - 0.2 ms) / reference's max: the quantity with a bar of 1.5
   std::vector<Miss> misses;
-  bool judgeable = false;  ///< the reference's own maximum stays below the slack: then no miss is allowed
+  std::set<std::string> foreign;  ///< PairData::foreign
+  bool judgeable = false;  ///< the reference's own maximum stays below the slack and nobody else's real-time thread
+                           ///< shared the core: then no miss is allowed
   std::vector<BehaviourChains> behaviours;
   std::vector<StageFigures> stages;
   std::size_t lost = 0;

@@ -30,7 +30,8 @@ void add_skipped(const Tick& tick, const Tick& next, const FlightTimes& times,
 
 const char* Miss::cause() const {
   if (host_noise) return "host noise";
-  return woken_late ? "not the host: another real-time thread held the core" : "control's own work";
+  return woken_late ? "woken late, though the host ran: another real-time thread, or the kernel, held the core"
+                    : "control's own work";
 }
 
 DurationNs stalled_ns(const std::vector<const std::vector<tools::Wakeup>*>& references, TimeNs from_ns, TimeNs to_ns) {

@@ -7,6 +7,7 @@
 
 #include "benchmarks/child.h"
 #include "benchmarks/latency_flight.h"
+#include "benchmarks/latency_foreign.h"
 #include "benchmarks/latency_load.h"
 #include "rt/clock.h"
 #include "rt/thread.h"
@@ -132,6 +133,7 @@ PairData run_pair(PairSetup setup, const LatencyOptions& options, const scheduli
   const auto tell = [&] {
     if (rt::now() - told < kSecond / 2) return;
     told = rt::now();
+    data.foreign.merge(foreign_real_time(setup.core, setup.control_priority));
     const Tick* t = flight.observer().newest();
     progress(to_seconds(told - start), t == nullptr ? 0 : t->value.released_at_ns - t->value.due_at_ns);
   };

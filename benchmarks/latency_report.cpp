@@ -110,7 +110,8 @@ nlohmann::json pair_json(const PairFigures& p) {
       {"unobserved", p.ours.unobserved},
       {"lost_by_the_observer", p.lost},
       {"ratio", {{"p50", p.ratio_p50}, {"p99", p.ratio_p99}, {"p999", p.ratio_p999}, {"max", p.ratio_max}}},
-      {"reference_below_slack", p.judgeable},
+      {"judgeable", p.judgeable},
+      {"foreign_real_time_threads", p.foreign},
       {"minor_faults", p.minor_faults},
       {"major_faults", p.major_faults},
       {"misses", nlohmann::json::array()},
@@ -147,6 +148,8 @@ std::string pair_text(const PairFigures& p) {
   if (p.lost + p.ours.unobserved > 0)
     text += fmt::format("  the observer was too late for {} messages\n", p.lost + p.ours.unobserved);
   for (const auto& m : p.misses) text += miss_text(m);
+  for (const auto& f : p.foreign)
+    text += fmt::format("    not ours, real-time, on core {} at control's priority or above: {}\n", p.setup.core, f);
   return text;
 }
 
@@ -168,7 +171,8 @@ std::string load_text(const LatencyRun& run, const LoadVerdict& v) {
                         r.name, r.value, r.unit, r.bar.empty() ? "" : "bar " + r.bar);
   if (v.judgeable_pairs == 0)
     text +=
-        "  the reference itself exceeded the slack in every pair: this host cannot judge deadlines under this load\n";
+        "  in every pair the reference itself exceeded the slack, or another real-time program shared the core: this\n"
+        "  machine cannot judge deadlines now\n";
   return text;
 }
 

@@ -3,6 +3,7 @@
 
 #include <numeric>
 
+#include "benchmarks/latency_foreign.h"
 #include "benchmarks/latency_judge.h"
 
 namespace wasp::bench {
@@ -44,7 +45,8 @@ TEST(LatencyMisses, AStallTheWitnessSharesIsHostNoise) {
   misses = find_misses(ticks, {}, {&saw_not});
   ASSERT_EQ(misses.size(), 1u);
   EXPECT_TRUE(misses[0].woken_late);
-  EXPECT_STREQ(misses[0].cause(), "not the host: another real-time thread held the core");
+  EXPECT_STREQ(misses[0].cause(),
+               "woken late, though the host ran: another real-time thread, or the kernel, held the core");
   EXPECT_FALSE(misses[0].host_noise);
 }
 
@@ -144,6 +146,24 @@ TEST(LatencyJudge, AReferenceBeyondTheSlackMakesAPairUnjudgeable) {
   EXPECT_FALSE(judge_pair(data).judgeable);
   data.reference.clear();
   EXPECT_FALSE(judge_pair(data).judgeable);
+}
+
+TEST(LatencyJudge, SomebodyElsesRealTimeThreadMakesAPairUnjudgeable) {
+  auto data = pair_of(30 * kUs, 20 * kUs);
+  data.foreign.insert("hog (80)");
+  EXPECT_FALSE(judge_pair(data).judgeable);
+}
+
+TEST(LatencyForeign, ThreadsAreReadFromTheirStat) {
+  std::string line = "12 (a (b) c) S 7";
+  for (int field = 5; field < 39; ++field) line += " 0";
+  const ThreadStat t = parse_thread_stat(line + " 3 80 1 0");
+  EXPECT_EQ(t.name, "a (b) c");
+  EXPECT_EQ(t.parent, 7);
+  EXPECT_EQ(t.core, 3);
+  EXPECT_EQ(t.rt_priority, 80);
+  EXPECT_EQ(parse_thread_stat("12 (a) S 7").core, -1);
+  EXPECT_EQ(parse_thread_stat("").rt_priority, 0);
 }
 
 TEST(LatencyJudge, MediansAreJudgedAndOnlyWhenBinding) {
