@@ -5,7 +5,7 @@ find_package(nlohmann_json REQUIRED)
 find_package(OpenCV REQUIRED COMPONENTS core imgproc)  # image_shift needs its warps and its peer
 
 wasp_program(wasp-eval
-  SOURCES eval_main.cpp eval_image_shift.cpp eval_figures.cpp eval_truth.cpp eval_depth_plane.cpp eval_edge_height.cpp
+  SOURCES eval_main.cpp eval_image_shift.cpp eval_image_shift_scenes.cpp eval_figures.cpp eval_truth.cpp eval_depth_plane.cpp eval_edge_height.cpp
           eval_motion.cpp eval_heading_rate.cpp eval_foe.cpp eval_time_to_contact.cpp
           eval_flow_grid.cpp eval_flow_depth.cpp
   DEPENDS wasp_vision wasp_drivers fmt::fmt CLI11::CLI11 nlohmann_json::nlohmann_json)

@@ -11,62 +11,17 @@
 
 #include "rt/contract.h"
 #include "tests/support/malloc_guard.h"
+#include "tests/vision/shift_picture.h"
 #include "vision/kernels/image_shift_reference.h"
 
 namespace wasp::vision {
 namespace {
 
-constexpr ImageShiftParams kQuick{.planning = FftPlanning::kEstimate};
+constexpr ImageShiftParams kQuick = test::kQuickShift;
 
-/// A picture known at every real-valued point: plane waves, amplitude 1 / frequency, so that shifts are exact.
-class Picture {
- public:
-  explicit Picture(unsigned seed) : random_(seed) {
-    std::uniform_real_distribution<double> unit(0.0, 1.0);
-    for (Wave& w : waves_) {
-      const double frequency = 0.004 * std::pow(80.0, unit(random_)), angle = 2 * std::numbers::pi * unit(random_);
-      w = {2 * std::numbers::pi * frequency * std::cos(angle), 2 * std::numbers::pi * frequency * std::sin(angle),
-           2 * std::numbers::pi * unit(random_), 0.02 / (frequency + 0.01)};
-    }
-  }
-
-  /// Window whose content is moved by (x, y), with white noise at `snr_db`.
-  std::vector<std::uint8_t> window(int columns, int rows, double x, double y, double snr_db) {
-    std::vector<double> values;
-    double mean = 0, square = 0;
-    for (int v = 0; v < rows; ++v)
-      for (int u = 0; u < columns; ++u) {
-        double sum = 0;
-        for (const Wave& w : waves_) sum += w.size * std::sin(w.x * (u - x) + w.y * (v - y) + w.phase);
-        values.push_back(sum);
-        mean += sum;
-        square += sum * sum;
-      }
-    const double n = static_cast<double>(values.size());
-    const double sigma = std::sqrt(square / n - mean * mean / n / n);
-    std::normal_distribution<double> noise(0.0, std::pow(10.0, -snr_db / 20));
-    std::vector<std::uint8_t> pixels;
-    for (const double value : values)
-      pixels.push_back(static_cast<std::uint8_t>(
-          std::clamp(std::lround(128 + 35 * ((value - mean / n) / sigma + noise(random_))), 0L, 255L)));
-    return pixels;
-  }
-
- private:
-  struct Wave {
-    double x, y, phase, size;
-  };
-  std::mt19937 random_;
-  std::array<Wave, 120> waves_;
-};
-
-GrayView view(const std::vector<std::uint8_t>& pixels, int columns) {
-  return {pixels.data(), columns, static_cast<int>(pixels.size()) / columns, columns};
-}
-
-double error_of(const ImageShift& s, double x, double y) {
-  return std::hypot(static_cast<double>(s.x_px) - x, static_cast<double>(s.y_px) - y);
-}
+using test::error_of;
+using test::Picture;
+using test::view;
 
 struct Case {
   int side;
@@ -123,19 +78,6 @@ TEST(ImageShift, IgnoresBrightnessAndContrast) {
   EXPECT_LT(error_of(plan.estimate(view(a, 128), view(b, 128)), 4.5, 2.25), 0.05);
 }
 
-TEST(ImageShift, UnrelatedPicturesAreReported) {
-  ImageShiftPlan plan(128, 128, kQuick);
-  std::mt19937 random(5);
-  int accepted = 0;
-  for (int i = 0; i < 40; ++i) {
-    std::vector<std::uint8_t> a(128 * 128), b(128 * 128);
-    for (auto* image : {&a, &b})
-      for (auto& p : *image) p = static_cast<std::uint8_t>(random() & 255);
-    accepted += plan.estimate(view(a, 128), view(b, 128)).valid ? 1 : 0;
-  }
-  EXPECT_EQ(accepted, 0);
-}
-
 TEST(ImageShift, FlatSaturatedAndBadInputIsInvalid) {
   ImageShiftPlan plan(64, 64, kQuick);
   const std::vector<std::uint8_t> flat(64 * 64, 255);
@@ -155,7 +97,7 @@ TEST(ImageShift, AllocatesNothing) {
   ImageShiftPlan plan(256, 256, kQuick);
   ShiftReference reference(256, 256);
   const auto a = picture.window(256, 256, 0, 0, 40), b = picture.window(256, 256, 9, -4, 40);
-  const test::MallocCount count;
+  const wasp::test::MallocCount count;
   {
     const rt::RealtimeSection section;
     (void)plan.estimate(view(a, 256), view(b, 256));

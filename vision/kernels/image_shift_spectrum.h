@@ -1,28 +1,13 @@
-// The inner loops of image_shift, as SIMD functions over whole arrays: Highway picks the widest instruction set the
-// processor has, once, at the first call. Realtime-safe: yes, all.
+// Spectra of image_shift: windowing, cross power, whitening and the correlation peak, as SIMD functions (Highway picks
+// the widest instruction set the processor has, once, at the first call). Realtime-safe: yes, all.
 #pragma once
 
 #include <complex>
 #include <cstddef>
-#include <cstdint>
 
-#include "types/image_view.h"
 #include "types/realtime.h"
 
 namespace wasp::vision::shift {
-
-inline constexpr int kMaxSide = 2048;    ///< pixels of a window's side
-inline constexpr int kMaxBin = 4;        ///< 2 x 2 pixels a half bin x 64 still fit 16 bits
-inline constexpr int kLanesMargin = 16;  ///< floats that rows may be read past their end
-
-/// Bins of bin x bin pixels (bin a power of two up to kMaxBin) from pixel (x, y), rows x columns of them, `pitch`
-/// floats a row. Each bin weighs 1 3 3 1 (by 1 3 3 1) the half bins about it, up to a scale: plain sums would alias,
-/// and aliases move the wrong way. Half bins beyond the area repeat its edge. The pixels must lie inside the view.
-void bin_image(const GrayView& image, int x, int y, int bin, int rows, int columns, float* out,
-               int pitch) WASP_REALTIME;
-
-/// The same from binned to twice as coarse: rows and columns are the result's.
-void halve_image(const float* in, int in_pitch, int rows, int columns, float* out, int pitch) WASP_REALTIME;
 
 /// sum of wy[r] wx[c] image[r][c].
 float weighted_sum(const float* image, int pitch, int rows, int columns, const float* wx,
@@ -67,14 +52,5 @@ struct PeakSums {
 /// ex, ey: unit phasors as (cos, sin) arrays; ey starts at row -rows_v. Derivatives are by the phase step per bin.
 PeakSums peak_sums(const Band& band, const float* ex_re, const float* ex_im, const float* ey_re,
                    const float* ey_im) WASP_REALTIME;
-
-/// Largest value of a row and its column.
-float max_of(const float* values, int count) WASP_REALTIME;
-
-/// Sums over the overlap of two images for the normalised coefficient (3.15).
-struct OverlapSums {
-  float a = 0, b = 0, aa = 0, bb = 0, ab = 0;
-};
-OverlapSums overlap_sums(const float* a, const float* b, int pitch, int rows, int columns) WASP_REALTIME;
 
 }  // namespace wasp::vision::shift
