@@ -124,7 +124,7 @@ bool fit_once(const AffineSums& sums, const CheckParams& params, Fitting& fittin
   if (check.fits == 2 && fitting.difference > kWorthwhile * fitting.first_difference) return false;
   move(check.motion, step.by, fitting.step > kLongestStep ? kLongestStep / fitting.step : 1.f);
   fitting.settled =
-      fitting.step < params.settled && std::max(std::abs(step.by[2]), std::abs(step.by[5])) < 5.f * params.settled;
+      fitting.step < params.settled && std::max(std::abs(step.by[2]), std::abs(step.by[5])) < 10.f * params.settled;
   return !fitting.settled;
 }
 

@@ -10,12 +10,12 @@
 
 namespace wasp::vision::shift {
 
-inline constexpr int kMostFits = 6;
+inline constexpr int kMostFits = 8;
 
 struct CheckParams {
   float agree = 0.15f;      ///< first step of the middle [bins] up to which the shift is left as it is at once
   float differ = 0.3f;      ///< first step [bins] from which a shift that no fit can mend is wrong
-  float settled = 0.08f;    ///< last step of the middle [bins] at which the fit has converged
+  float settled = 0.03f;    ///< last step of the middle [bins] at which the fit has converged
   float explained = 0.7f;   ///< difference a fit must get below, as a share of what the shift leaves, to be believed
   float most_error = 0.1f;  ///< standard deviation of the middle's motion [bins] from noise that makes the difference
   float least_texture = 2;  ///< energy of the gradient in its weakest direction, over what noise alone would show
