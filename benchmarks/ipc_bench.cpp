@@ -12,11 +12,13 @@
 #include <new>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "benchmarks/bench.h"
 #include "benchmarks/child.h"
 #include "benchmarks/ipc_observers.h"
 #include "benchmarks/ipc_run.h"
+#include "benchmarks/ipc_victims.h"
 #include "benchmarks/report.h"
 #include "rt/process.h"
 #include "shm/region.h"
@@ -31,26 +33,47 @@ struct Contender {
   const char* name;
   int (*writer)(const std::string&, Run&);
   int (*reader)(const std::string&, Run&);
+  Before before = Before::kNothing;
+  bool every_mode = false;  ///< else only where readers are woken, at the full rate
 };
-constexpr Contender kWasp{"wasp", wasp_writer, wasp_reader};
+constexpr Contender kContenders[] = {
+    {"wasp", wasp_writer, wasp_reader, Before::kAnnounce, true},  // as our cameras publish
+    {"wasp_unannounced", wasp_writer, wasp_reader},
+    {"wasp_rung_twice", wasp_writer, wasp_reader, Before::kRing},
 #ifdef WASP_HAVE_ICEORYX
-constexpr Contender kIceoryx{"iceoryx", iceoryx_writer, iceoryx_reader};
+    {"iceoryx", iceoryx_writer, iceoryx_reader, Before::kNothing, true},
 #endif
+    {"bare_futex", futex_writer, futex_reader},
+    {"bare_eventfd", eventfd_writer, eventfd_reader},
+    {"pipe", pipe_writer, pipe_reader},
+};
 
 struct ModeRow {
   const char* name;
   Mode mode;
+  DurationNs period_ns;
+  std::uint32_t warm_up;
+  double share;              ///< of the time, a block
   double p50_bar, p999_bar;  ///< of the ratio to iceoryx; 0: none
 };
-constexpr ModeRow kModes[] = {{"woken", Mode::kWoken, 0.6, 1.0},
-                              {"announced", Mode::kAnnounced, 0, 0},
-                              {"polled", Mode::kPolled, 0.3, 0},
-                              {"spinning", Mode::kSpinning, 0, 0}};
+constexpr ModeRow kModes[] = {{"woken", Mode::kWoken, 500 * kMicrosecond, kWarmUp, 1, 0.6, 1.0},
+                              {"woken_30hz", Mode::kWoken, 33'333 * kMicrosecond, 2, 1.4, 0, 0},
+                              {"polled", Mode::kPolled, 500 * kMicrosecond, kWarmUp, 1, 0.3, 0},
+                              {"spinning", Mode::kSpinning, 500 * kMicrosecond, kWarmUp, 1, 0, 0}};
+
+/// Ringing twice and the kernel's bare means are measured woken at the full rate only.
+bool takes_part(const Contender& contender, const ModeRow& row, bool iceoryx_there) {
+  if (!iceoryx_there && contender.name == std::string_view("iceoryx")) return false;
+  if (contender.every_mode || row.name == std::string_view("woken")) return true;
+  return row.mode == Mode::kWoken && contender.name == std::string_view("wasp_unannounced");
+}
 
 /// Samples of one contender in one mode: all, and the median of each repeat.
 struct Pool {
   std::vector<std::int64_t> latency_ns;
   std::vector<double> medians;
+  DurationNs reader_cpu_ns = 0;
+  std::uint64_t frames = 0;
 };
 
 Run* shared_run() {
@@ -58,9 +81,12 @@ Run* shared_run() {
   return memory == MAP_FAILED ? nullptr : new (memory) Run;
 }
 
-bool one_block(const Contender& contender, Mode mode, const Placement& placement, Run& run, Pool& pool) {
+bool one_block(const Contender& contender, const ModeRow& row, const Placement& placement, Run& run, Pool& pool) {
   const std::string name = "wasp.bench." + std::to_string(getpid()) + ".ipc";
-  run.mode = mode;
+  run.mode = row.mode;
+  run.before = contender.before;
+  run.period_ns = row.period_ns;
+  run.warm_up = row.warm_up;
   run.yields = !placement.two_cores;
   run.reader_ready = run.finished = run.told = 0;
   run.next_due_ns = 0;
@@ -75,6 +101,8 @@ bool one_block(const Contender& contender, Mode mode, const Placement& placement
   const std::vector<std::int64_t> samples(run.latency_ns.begin(), run.latency_ns.begin() + run.received);
   pool.medians.push_back(quantiles(samples).p50);
   pool.latency_ns.insert(pool.latency_ns.end(), samples.begin(), samples.end());
+  pool.reader_cpu_ns += run.reader_cpu_ns;
+  pool.frames += run.frames;
   return written && read && !samples.empty() && !interrupted();
 }
 
@@ -88,14 +116,15 @@ std::string spread(const Pool& ours, const Pool& theirs) {
   return text;
 }
 
-void report_ratios(Report& report, const ModeRow& row, const Pool& ours, const Pool& theirs) {
+void report_ratios(Report& report, const ModeRow& row, const Pool& ours, const Pool& theirs, const std::string& name,
+                   bool judged) {
   const Quantiles a = quantiles(ours.latency_ns), b = quantiles(theirs.latency_ns);
   const auto ratio = [&](const std::string& what, double value, double bar, const std::string& remark) {
-    const std::string name = std::string(row.name) + ".ratio." + what;
-    bar > 0 ? report.bar(name, value, "1", bar, remark) : report.figure(name, value, "1", remark);
+    const std::string line = name + "." + what;
+    judged&& bar > 0 ? report.bar(line, value, "1", bar, remark) : report.figure(line, value, "1", remark);
   };
   ratio("p50", a.p50 / b.p50, row.p50_bar, spread(ours, theirs));
-  ratio("p999", a.p999 / b.p999, row.p999_bar, {});
+  if (a.count > 1000) ratio("p999", a.p999 / b.p999, row.p999_bar, {});
 }
 
 /// Regions of an earlier run that was killed with SIGKILL, the one signal that leaves them behind.
@@ -108,14 +137,38 @@ void sweep_up() {
 }
 
 /// Runs the blocks; false if something broke or was interrupted.
-bool run_blocks(const std::vector<Contender>& contenders, const Placement& placement, Run& run,
+bool run_blocks(bool iceoryx_there, const Placement& placement, Run& run, double seconds,
                 std::map<std::string, Pool>& pools) {
+  double shares = 0;
+  for (const ModeRow& row : kModes)
+    for (const Contender& c : kContenders) shares += takes_part(c, row, iceoryx_there) ? row.share : 0;
   for (int repeat = 0; repeat < kRepeats; ++repeat)
     for (const ModeRow& row : kModes)
-      for (const Contender& contender : contenders)
-        if (!one_block(contender, row.mode, placement, run, pools[std::string(row.name) + "." + contender.name]))
-          return false;
+      for (const Contender& c : kContenders) {
+        if (!takes_part(c, row, iceoryx_there)) continue;
+        const double frames = seconds * row.share / (shares * kRepeats) / to_seconds(row.period_ns);
+        run.frames = std::min<std::uint32_t>(static_cast<std::uint32_t>(frames) + 2 * row.warm_up + 1, kMaxFrames);
+        if (!one_block(c, row, placement, run, pools[std::string(row.name) + "." + c.name])) return false;
+      }
   return true;
+}
+
+void report_mode(Report& report, const ModeRow& row, std::map<std::string, Pool>& pools, bool iceoryx_there) {
+  const std::string stem = std::string(row.name) + ".";
+  for (const Contender& c : kContenders) {
+    if (!takes_part(c, row, iceoryx_there)) continue;
+    const Pool& pool = pools[stem + c.name];
+    report.row(stem + c.name, quantiles(pool.latency_ns));
+    if (row.mode == Mode::kWoken)
+      report.figure(stem + c.name + ".reader_cpu",
+                    static_cast<double>(pool.reader_cpu_ns) / 1000.0 / static_cast<double>(pool.frames), "us",
+                    "processor time of the reader, a frame");
+  }
+  if (!iceoryx_there) return;
+  const Pool& theirs = pools[stem + "iceoryx"];
+  report_ratios(report, row, pools[stem + "wasp"], theirs, stem + "ratio", true);
+  if (row.mode == Mode::kWoken)
+    report_ratios(report, row, pools[stem + "wasp_unannounced"], theirs, stem + "ratio_unannounced", false);
 }
 
 }  // namespace
@@ -129,33 +182,28 @@ int run_ipc(const Options& options) {
   if (run == nullptr) return 2;
   report.note("machine", rt::host_description() + ", Linux " + rt::kernel_description() + ", gcc " + __VERSION__);
   report.note("placement", placement.description());
+  open_kernel_means();
 
-  std::vector<Contender> contenders{kWasp};
+  bool iceoryx_there = false;
 #ifdef WASP_HAVE_ICEORYX
   const tools::RoudiProcess roudi({.interrupted = interrupted});
-  if (roudi.trouble().empty())
-    contenders.push_back(kIceoryx);
-  else
-    report.note("iceoryx", roudi.trouble() + "; wasp is measured alone");
+  iceoryx_there = roudi.trouble().empty();
+  if (!iceoryx_there) report.note("iceoryx", roudi.trouble() + "; wasp is measured without it");
 #else
-  report.note("iceoryx", "not there when this was built; wasp is measured alone");
+  report.note("iceoryx", "not there when this was built; wasp is measured without it");
 #endif
 
-  const double blocks = static_cast<double>(kRepeats * std::size(kModes) * contenders.size());
-  const double frames = 0.75 * options.seconds / blocks / to_seconds(run->period_ns);
-  run->frames = std::min<std::uint32_t>(static_cast<std::uint32_t>(frames) + 2 * kWarmUp, kMaxFrames);
   std::map<std::string, Pool> pools;
-  if (!run_blocks(contenders, placement, *run, pools)) {
+  if (!run_blocks(iceoryx_there, placement, *run, 0.7 * options.seconds, pools)) {
     report.note("ipc", interrupted() ? "interrupted" : "a writer or reader failed");
     return 2;
   }
-  for (const ModeRow& row : kModes) {
-    const std::string stem = row.name;
-    for (const Contender& c : contenders)
-      report.row(stem + "." + c.name, quantiles(pools[stem + "." + c.name].latency_ns));
-    if (contenders.size() > 1) report_ratios(report, row, pools[stem + ".wasp"], pools[stem + ".iceoryx"]);
-  }
-  measure_observers(report, placement, *run, 0.25 * options.seconds);
+  for (const ModeRow& row : kModes) report_mode(report, row, pools, iceoryx_there);
+  run->before = Before::kNothing;
+  run->period_ns = 500 * kMicrosecond;
+  run->warm_up = kWarmUp;
+  measure_observers(report, placement, *run, 0.15 * options.seconds);
+  measure_victims(report, placement, *run, 0.15 * options.seconds);
   if (interrupted()) return 2;
   return report.met() ? 0 : 1;
 }

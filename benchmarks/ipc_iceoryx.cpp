@@ -34,7 +34,7 @@ class Writer {
     publisher_.loan(kFrameBytes, 64).and_then([this](void* chunk) { chunk_ = chunk; });
     return static_cast<std::byte*>(chunk_);
   }
-  void announce() noexcept {}
+  void before_copy(Before) noexcept {}
   void publish(TimeNs) noexcept { publisher_.publish(chunk_); }
 
  private:
@@ -80,7 +80,7 @@ int iceoryx_writer(const std::string& name, Run& run) {
 
 int iceoryx_reader(const std::string& name, Run& run) {
   start_runtime("reader");
-  Reader reader(name, run.mode == Mode::kWoken || run.mode == Mode::kAnnounced);
+  Reader reader(name, run.mode == Mode::kWoken);
   for (int i = 0; i < 5000 && !reader.connected(); ++i) rt::sleep_until(rt::now() + kMillisecond);
   return reader.connected() ? read_frames(reader, run) : 2;
 }

@@ -2,10 +2,9 @@
 // that wasp and iceoryx are timed by the same lines: the clock starts after the pixels are in the loan, just before
 // publish, and stops when the reader has the frame's header in hand.
 //
-//   woken     the reader sleeps (bell, WaitSet) and is woken by the publish
+//   woken     the reader sleeps (bell, WaitSet, ...) and is woken for each frame
 //   polled    the reader looks exactly once for each publish, told by a word apart that the publish has returned
-//   announced as woken, but the wasp writer announces the frame before it copies the pixels (iceoryx knows no such
-//   thing) spinning  the reader looks without pause; it may see the frame before publish returns
+//   spinning  the reader looks without pause; it may see the frame before publish returns
 #pragma once
 
 #include <sched.h>
@@ -22,7 +21,14 @@
 
 namespace wasp::bench {
 
-enum class Mode { kWoken, kAnnounced, kPolled, kSpinning };
+enum class Mode { kWoken, kPolled, kSpinning };
+
+/// What a wasp writer does before it copies the pixels.
+enum class Before {
+  kNothing,
+  kAnnounce,  ///< wakes the reader, which stays awake for the copy (at most Bell::kAnnounceSpin): what our cameras do
+  kRing,      ///< wakes the reader, which finds nothing and sleeps again
+};
 
 inline constexpr std::size_t kPixels = 640 * 480;
 inline constexpr std::size_t kFrameBytes = kFramePixelOffset + kPixels;
@@ -32,7 +38,9 @@ inline constexpr std::uint32_t kWarmUp = 50;
 /// Shared between parent, writer and reader.
 struct Run {
   Mode mode = Mode::kWoken;
+  Before before = Before::kNothing;
   std::uint32_t frames = 0;  ///< to publish, warm-up included
+  std::uint32_t warm_up = kWarmUp;
   DurationNs period_ns = 500 * kMicrosecond;
   bool yields = false;  ///< one core: a spinning reader must let the writer run
   std::atomic<std::uint32_t> reader_ready{0};
@@ -40,12 +48,14 @@ struct Run {
   alignas(64) std::atomic<std::uint32_t> told{0};  ///< sequence of the newest frame whose publish has returned
   alignas(64) std::atomic<TimeNs> next_due_ns{0};  ///< so that a polling reader need not spin all the time
   alignas(64) std::uint32_t received = 0, written = 0;
+  std::atomic<std::uint64_t> lost{0};        ///< frames a reader missed
+  std::atomic<DurationNs> reader_cpu_ns{0};  ///< processor time of the reader, start-up left out
   std::array<std::int64_t, kMaxFrames> latency_ns;
   std::array<std::int64_t, kMaxFrames> publish_ns;  ///< publish alone
   std::array<std::int64_t, kMaxFrames> frame_ns;    ///< loan, 307 200 bytes, publish
 };
 
-/// `Writer`: std::byte* loan(); void announce(); void publish(TimeNs).
+/// `Writer`: std::byte* loan(); void before_copy(Before); void publish(TimeNs).
 template <class Writer>
 int write_frames(Writer& writer, Run& run) {
   const std::vector<unsigned char> image(kPixels, 7);
@@ -59,7 +69,7 @@ int write_frames(Writer& writer, Run& run) {
     const TimeNs began = rt::now();
     std::byte* loan = writer.loan();
     if (loan == nullptr) return 2;
-    if (run.mode == Mode::kAnnounced) writer.announce();
+    writer.before_copy(run.before);
     std::memcpy(loan + kFramePixelOffset, image.data(), kPixels);
     FrameHeader head{
         .sequence = sequence, .format = PixelFormat::kMono8, .width_px = 640, .height_px = 480, .stride_bytes = 640};
@@ -69,7 +79,7 @@ int write_frames(Writer& writer, Run& run) {
     writer.publish(published);
     const TimeNs done = rt::now();
     run.told.store(sequence, std::memory_order_release);
-    if (sequence <= kWarmUp) continue;
+    if (sequence <= run.warm_up) continue;
     run.publish_ns[run.written] = done - published;
     run.frame_ns[run.written++] = done - began;
   }
@@ -87,9 +97,16 @@ inline bool await_announcement(Run& run, std::uint32_t last) {
   return true;
 }
 
+/// Of this process, so far.
+inline DurationNs processor_time() {
+  timespec ts{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &ts);
+  return static_cast<DurationNs>(ts.tv_sec) * kSecond + ts.tv_nsec;
+}
+
 inline void note_received(Run& run, const FrameHeader& head) {
   const TimeNs received = rt::now();
-  if (head.sequence > kWarmUp) run.latency_ns[run.received++] = received - head.exposed_at_ns;
+  if (head.sequence > run.warm_up) run.latency_ns[run.received++] = received - head.exposed_at_ns;
 }
 
 /// Sleeps for the next frame, then takes all there are: a frame that came unannounced must not make the rest late.
@@ -125,6 +142,7 @@ void read_spinning(Reader& reader, Run& run) {
 /// frame not yet taken, and may leave out torn ones.
 template <class Reader>
 int read_frames(Reader& reader, Run& run) {
+  const DurationNs cpu_at_start_ns = processor_time();
   run.reader_ready = 1;
   std::uint32_t last = 0;
   while (run.finished.load(std::memory_order_relaxed) == 0) {
@@ -135,6 +153,7 @@ int read_frames(Reader& reader, Run& run) {
     else
       read_woken(reader, run);
   }
+  run.reader_cpu_ns = processor_time() - cpu_at_start_ns;
   return 0;
 }
 
@@ -143,5 +162,15 @@ int wasp_writer(const std::string& region, Run& run);
 int wasp_reader(const std::string& region, Run& run);
 int iceoryx_writer(const std::string& name, Run& run);
 int iceoryx_reader(const std::string& name, Run& run);
+
+/// The kernel's own means, without any ring: what a wake-up costs at the least, and a frame through a pipe. Open them
+/// in the parent, before the two ends are started.
+void open_kernel_means();
+int futex_writer(const std::string&, Run& run);
+int futex_reader(const std::string&, Run& run);
+int eventfd_writer(const std::string&, Run& run);
+int eventfd_reader(const std::string&, Run& run);
+int pipe_writer(const std::string&, Run& run);
+int pipe_reader(const std::string&, Run& run);
 
 }  // namespace wasp::bench

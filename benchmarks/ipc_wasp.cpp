@@ -9,13 +9,18 @@ namespace {
 
 class Writer {
  public:
-  explicit Writer(const shm::Region& region) : ring_(region, "gray", "Frame") {}
+  explicit Writer(const shm::Region& region)
+      : ring_(region, "gray", "Frame"), bell_(*region.bell(region.topic("gray"))) {}
   std::byte* loan() noexcept { return ring_.loan(); }
-  void announce() noexcept { ring_.announce(); }
+  void before_copy(Before before) noexcept {
+    if (before == Before::kAnnounce) ring_.announce();
+    if (before == Before::kRing) bell_.ring();
+  }
   void publish(TimeNs published_at_ns) noexcept { ring_.publish(published_at_ns); }
 
  private:
   shm::RingWriter ring_;
+  rt::Bell& bell_;
 };
 
 class Reader {

@@ -27,20 +27,30 @@ inline void futex_wake_all(std::atomic<std::uint32_t>* word) WASP_REALTIME {
   syscall(SYS_futex, word, FUTEX_WAKE, INT_MAX, nullptr, nullptr, 0);
 }
 
-/// A doorbell: `ring` after publishing, `wait` for a change. Rings cost no system call while nobody sleeps.
-/// A sleeper that dies leaves the count raised: later rings make one needless system call, nothing else.
+/// A doorbell: `ring` after publishing, `wait` for a change. A ring costs a system call only if somebody has gone to
+/// sleep since the last one: a sleeper that died, or was stopped, costs the writer one needless call and no more.
 struct alignas(64) Bell {
   std::atomic<std::uint32_t> word{0};
-  std::atomic<std::uint32_t> sleepers{0};
+  std::atomic<std::uint32_t> arrivals{0};      ///< counts who lies down to sleep; written by sleepers
+  std::atomic<std::uint32_t> served{0};        ///< arrivals already woken; written by the ringer
   std::atomic<std::uint32_t> announced_on{0};  ///< core of the last announce() + 1; 0: never
 
   /// How long a sleeper woken by announce() stays awake for the ring to follow.
   static constexpr DurationNs kAnnounceSpin = 50 * kMicrosecond;
 
+  /// True if somebody lay down since the last ring.
+  [[nodiscard]] bool awaited() const WASP_REALTIME {
+    return arrivals.load(std::memory_order_seq_cst) != served.load(std::memory_order_relaxed);
+  }
+  /// One thread at a time. Either a sleeper sees the new word and stays awake, or this sees its arrival. `served`
+  /// follows the wake: a writer that dies between the two leaves a needless call to its successor, never a sleeper.
   /// Realtime-safe: yes.
   void ring() WASP_REALTIME {
     word.fetch_add(1, std::memory_order_seq_cst);
-    if (sleepers.load(std::memory_order_seq_cst) != 0) futex_wake_all(&word);
+    const std::uint32_t arrived = arrivals.load(std::memory_order_seq_cst);
+    if (arrived == served.load(std::memory_order_relaxed)) return;
+    futex_wake_all(&word);
+    served.store(arrived, std::memory_order_relaxed);
   }
   /// Wakes the sleepers ahead of a ring that follows within kAnnounceSpin, so that they wake up while the writer is
   /// still at work. A sleeper on the writer's own core goes back to sleep at once: it would only be in the way.
@@ -56,9 +66,8 @@ struct alignas(64) Bell {
       const std::uint32_t seen = word.load(std::memory_order_seq_cst);
       if (ready()) return true;
       if (now() >= deadline_ns) return false;
-      sleepers.fetch_add(1, std::memory_order_seq_cst);
+      arrivals.fetch_add(1, std::memory_order_seq_cst);
       if (word.load(std::memory_order_seq_cst) == seen) futex_wait_until(&word, seen, deadline_ns);
-      sleepers.fetch_sub(1, std::memory_order_relaxed);
       if (announced_elsewhere()) await_announced(ready, deadline_ns);
     }
   }

@@ -15,6 +15,7 @@ constexpr DurationNs kPatience = 20 * kSecond;
 void write_frame(shm::RingWriter& ring, const void* pixels, drivers::Recording::Size size, std::uint32_t pixel_bytes,
                  PixelFormat format, std::uint32_t sequence, TimeNs exposed_at_ns) WASP_REALTIME {
   std::byte* slot = ring.loan();
+  ring.announce();
   FrameHeader header;
   header.exposed_at_ns = exposed_at_ns;
   header.sequence = sequence;

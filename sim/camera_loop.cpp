@@ -58,10 +58,16 @@ void CameraLoop::publish(const BodyPose& pose, std::uint32_t sequence) {
   const FrameHeader depth_header = header_of(camera_, PixelFormat::kDepth16Mm, 2, pose.at_ns, sequence);
   std::memcpy(gray, &gray_header, sizeof gray_header);
   std::memcpy(depth, &depth_header, sizeof depth_header);
+  const auto announce = [this] {
+    gray_.announce();
+    depth_.announce();
+    announced_at_ns_ = rt::now();
+  };
   camera_.render(pose, sequence, reinterpret_cast<std::uint8_t*>(gray + kFramePixelOffset),
-                 reinterpret_cast<std::uint16_t*>(depth + kFramePixelOffset));
+                 reinterpret_cast<std::uint16_t*>(depth + kFramePixelOffset), announce);
   gray_.publish(rt::now());
   depth_.publish(rt::now());
+  lead_.record(rt::now() - announced_at_ns_);
 }
 
 void CameraLoop::run(const std::atomic<bool>& stop) {

@@ -23,6 +23,8 @@ class CameraLoop {
     return skipped_;
   }  ///< exposures missed because rendering took too long
   [[nodiscard]] const rt::Histogram& render_time() const { return render_time_; }
+  /// From the announcement of a frame to its publication.
+  [[nodiscard]] const rt::Histogram& lead() const { return lead_; }
 
   /// Topics of a camera region with frames of this size.
   static std::vector<shm::TopicSpec> topics(int width_px, int height_px);
@@ -36,7 +38,8 @@ class CameraLoop {
   shm::RingWriter gray_, depth_;
   PoseQueue& poses_;
   BodyPose before_, after_;
-  rt::Histogram render_time_;
+  rt::Histogram render_time_, lead_;
+  TimeNs announced_at_ns_ = 0;
   std::uint64_t skipped_ = 0;
 };
 

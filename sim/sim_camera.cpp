@@ -24,13 +24,15 @@ CameraPose SimCamera::camera_pose(const BodyPose& pose) const {
           pose.q_ned_body.toRotationMatrix() * geometry_.R_body_cam};
 }
 
-void SimCamera::render(const BodyPose& pose, std::uint32_t frame, std::uint8_t* gray, std::uint16_t* depth_mm) {
+void SimCamera::render(const BodyPose& pose, std::uint32_t frame, std::uint8_t* gray, std::uint16_t* depth_mm,
+                       const std::function<void()>& almost_done) {
   const CameraPose camera = camera_pose(pose);
   const auto width = static_cast<std::size_t>(renderer_.width_px());
   for (int band = 0; band < renderer_.height_px(); band += Renderer::kBandRows) {
     renderer_.render_band(camera, band, luminance_.data(), depth_m_.data());
     for (int i = 0; i < Renderer::kBandRows; ++i) {
       const std::size_t from = static_cast<std::size_t>(i) * width, to = static_cast<std::size_t>(band + i) * width;
+      if (almost_done && band + i == renderer_.height_px() - kLastRows) almost_done();
       sensor_.gray_row(frame, band + i, luminance_.data() + from, gray + to);
       sensor_.depth_row(frame, band + i, depth_m_.data() + from, depth_mm + to);
     }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "sim/pose.h"
@@ -17,8 +18,11 @@ class SimCamera {
   explicit SimCamera(const SimConfig& config);
 
   /// Both images of one exposure at a body pose: mono8 and depth uint16 mm (0 = no reading), row-major, no padding,
-  /// width_px x height_px. `frame` numbers the noise. One thread at a time. Allocates nothing.
-  void render(const BodyPose& pose, std::uint32_t frame, std::uint8_t* gray, std::uint16_t* depth_mm);
+  /// width_px x height_px. `frame` numbers the noise. `almost_done`, if given, is called kLastRows rows before the end.
+  /// One thread at a time. Allocates nothing.
+  void render(const BodyPose& pose, std::uint32_t frame, std::uint8_t* gray, std::uint16_t* depth_mm,
+              const std::function<void()>& almost_done = {});
+  static constexpr int kLastRows = 2;
 
   [[nodiscard]] CameraPose camera_pose(const BodyPose& pose) const;
   [[nodiscard]] const Renderer& renderer() const { return renderer_; }

@@ -122,11 +122,12 @@ void run(const Options& options, const sigset_t& signals) {
 
   std::printf("wasp-sim: %llu late ticks", static_cast<unsigned long long>(vehicle_loop.late_ticks()));
   if (camera_loop)
-    std::printf(", %llu frames, %llu skipped, rendering p50 %.2f ms, max %.2f ms",
+    std::printf(", %llu frames, %llu skipped, rendering p50 %.2f ms, max %.2f ms, announced %.0f us ahead",
                 static_cast<unsigned long long>(camera_loop->frames()),
                 static_cast<unsigned long long>(camera_loop->skipped()),
                 static_cast<double>(camera_loop->render_time().quantile_ns(0.5)) * 1e-6,
-                static_cast<double>(camera_loop->render_time().max_ns()) * 1e-6);
+                static_cast<double>(camera_loop->render_time().max_ns()) * 1e-6,
+                static_cast<double>(camera_loop->lead().quantile_ns(0.5)) * 1e-3);
   std::printf("\n");
 }
 
