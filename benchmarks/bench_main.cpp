@@ -14,9 +14,13 @@ struct Row {
 };
 
 constexpr Row kRows[] = {
-    {"ipc", "a camera frame from process to process, beside iceoryx; publishing under observers", wasp::bench::run_ipc},
+    {"ipc", "a camera frame from process to process, beside iceoryx, pipe, futex, eventfd; observers; killed readers",
+     wasp::bench::run_ipc},
+    {"bridge", "control timing with and without the iceoryx gateway, killed and frozen at random beside the flight",
+     wasp::bench::run_bridge},
 #ifdef WASP_HAVE_BENCHMARK
-    {"micro", "histogram, seqlock, queue, ring and bell, one operation each (Google Benchmark)",
+    {"micro",
+     "histogram, seqlock, queue, ring, bell, MAVLink, control step, first touch: one operation each (Google Benchmark)",
      wasp::bench::run_micro},
 #endif
 #ifdef WASP_HAVE_OPENCV

@@ -27,7 +27,7 @@
 namespace wasp::bench {
 namespace {
 
-constexpr int kRepeats = 5;
+constexpr int kRepeats = 9;
 
 struct Contender {
   const char* name;
@@ -68,10 +68,10 @@ bool takes_part(const Contender& contender, const ModeRow& row, bool iceoryx_the
   return row.mode == Mode::kWoken && contender.name == std::string_view("wasp_unannounced");
 }
 
-/// Samples of one contender in one mode: all, and the median of each repeat.
+/// Samples of one contender in one mode: all, and the median and p99.9 of each repeat.
 struct Pool {
   std::vector<std::int64_t> latency_ns;
-  std::vector<double> medians;
+  std::vector<double> p50, p999;
   DurationNs reader_cpu_ns = 0;
   std::uint64_t frames = 0;
 };
@@ -99,32 +99,46 @@ bool one_block(const Contender& contender, const ModeRow& row, const Placement& 
   const bool read = finish(reader, written ? 10 : 0);
   shm::Region::remove(name);
   const std::vector<std::int64_t> samples(run.latency_ns.begin(), run.latency_ns.begin() + run.received);
-  pool.medians.push_back(quantiles(samples).p50);
+  const Quantiles q = quantiles(samples);
+  pool.p50.push_back(q.p50);
+  pool.p999.push_back(q.p999);
   pool.latency_ns.insert(pool.latency_ns.end(), samples.begin(), samples.end());
   pool.reader_cpu_ns += run.reader_cpu_ns;
   pool.frames += run.frames;
   return written && read && !samples.empty() && !interrupted();
 }
 
-std::string spread(const Pool& ours, const Pool& theirs) {
-  std::vector<double> ratios;
-  for (std::size_t i = 0; i < std::min(ours.medians.size(), theirs.medians.size()); ++i)
-    ratios.push_back(ours.medians[i] / theirs.medians[i]);
-  const auto [low, high] = std::minmax_element(ratios.begin(), ratios.end());
+double median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  return values.empty() ? 0 : values[values.size() / 2];
+}
+
+/// Of each repeat: the two were measured one after the other.
+std::vector<double> ratios(const std::vector<double>& ours, const std::vector<double>& theirs) {
+  std::vector<double> result;
+  for (std::size_t i = 0; i < std::min(ours.size(), theirs.size()); ++i) result.push_back(ours[i] / theirs[i]);
+  return result;
+}
+
+std::string spread(const std::vector<double>& values) {
+  const auto [low, high] = std::minmax_element(values.begin(), values.end());
   char text[64];
-  std::snprintf(text, sizeof text, "repeats %.2f to %.2f", *low, *high);
+  std::snprintf(text, sizeof text, "median of %zu repeats, %.2f to %.2f", values.size(), *low, *high);
   return text;
 }
 
+/// The median over the repeats: a host that stands still in one of them does not decide.
 void report_ratios(Report& report, const ModeRow& row, const Pool& ours, const Pool& theirs, const std::string& name,
                    bool judged) {
-  const Quantiles a = quantiles(ours.latency_ns), b = quantiles(theirs.latency_ns);
-  const auto ratio = [&](const std::string& what, double value, double bar, const std::string& remark) {
+  const auto ratio = [&](const char* what, const std::vector<double>& values, double bar) {
     const std::string line = name + "." + what;
-    judged&& bar > 0 ? report.bar(line, value, "1", bar, remark) : report.figure(line, value, "1", remark);
+    if (judged && bar > 0)
+      report.bar(line, median(values), "1", bar, spread(values));
+    else
+      report.figure(line, median(values), "1", spread(values));
   };
-  ratio("p50", a.p50 / b.p50, row.p50_bar, spread(ours, theirs));
-  if (a.count > 1000) ratio("p999", a.p999 / b.p999, row.p999_bar, {});
+  ratio("p50", ratios(ours.p50, theirs.p50), row.p50_bar);
+  if (ours.latency_ns.size() > 1000) ratio("p999", ratios(ours.p999, theirs.p999), row.p999_bar);
 }
 
 /// Regions of an earlier run that was killed with SIGKILL, the one signal that leaves them behind.

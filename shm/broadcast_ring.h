@@ -32,6 +32,9 @@ class RingWriter {
   [[nodiscard]] std::byte* loan() WASP_REALTIME {
     const std::uint64_t n = published() + 1;
     std::byte* slot = slot_of(n);
+    // Unchanged, but from here on the line is fetched back from whoever looked at it, while the message is written:
+    // else publish() would wait for it.
+    ring_->published.store(n - 1, std::memory_order_relaxed);
     reinterpret_cast<SlotHeader*>(slot)->sequence.store(2 * n - 1, std::memory_order_relaxed);
     std::atomic_thread_fence(std::memory_order_release);
     return slot + sizeof(SlotHeader);

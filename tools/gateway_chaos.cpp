@@ -12,6 +12,12 @@ GatewayChaos::GatewayChaos(RoudiProcess& daemon, std::vector<std::string> argume
   start();
 }
 
+GatewayChaos::~GatewayChaos() {
+  daemon_.signal(SIGCONT);
+  to_gateway(SIGCONT);
+  to_worker(SIGCONT);
+}
+
 void GatewayChaos::start() { gateway_ = std::make_unique<ChildProcess>(arguments_, log_path_); }
 
 /// The gateway's only child, while it has one.

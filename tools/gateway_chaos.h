@@ -16,6 +16,10 @@ class GatewayChaos {
  public:
   /// Starts the gateway: `arguments` with the path of wasp-iceoryx first. What it says goes to `log_path`.
   GatewayChaos(RoudiProcess& daemon, std::vector<std::string> arguments, std::string log_path, unsigned seed);
+  /// Thaws all three and ends the gateway.
+  ~GatewayChaos();
+  GatewayChaos(const GatewayChaos&) = delete;
+  GatewayChaos& operator=(const GatewayChaos&) = delete;
 
   /// One act: kills, freezes or thaws one of the three.
   void act();
