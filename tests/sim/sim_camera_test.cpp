@@ -32,6 +32,22 @@ TEST(SimCamera, FramesAreDeterministicAndStandingDepthIsThere) {
   EXPECT_GT(valid, 0.9 * 200 * 640);
 }
 
+TEST(SimCamera, SaysOnceThatAFrameIsAlmostDoneWhenOnlyTheLastRowsAreMissing) {
+  SimCamera camera{SimConfig{}};
+  std::vector<std::uint8_t> gray(640 * 480, 0);
+  std::vector<std::uint16_t> depth(640 * 480, 0);
+  int calls = 0;
+  std::size_t first_missing = 0;
+  camera.render({0, {0, 0, -0.2f}, Quat::Identity()}, 4, gray.data(), depth.data(), [&] {
+    ++calls;
+    first_missing = gray.size();
+    while (first_missing > 0 && gray[first_missing - 1] == 0) --first_missing;
+  });
+  EXPECT_EQ(calls, 1);
+  EXPECT_LE(first_missing, static_cast<std::size_t>(640 * (480 - SimCamera::kLastRows)));
+  EXPECT_GT(first_missing, static_cast<std::size_t>(640 * 400));
+}
+
 TEST(SimCamera, InterpolatesPoses) {
   const BodyPose a{10, {0, 0, -1}, Quat::Identity()}, b{20, {1, 0, -2}, quat_from_euler({0.2f, 0, 0})};
   const BodyPose middle = interpolate(a, b, 15);
