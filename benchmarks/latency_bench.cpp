@@ -45,20 +45,30 @@ class Progress {
   TimeNs told_ns_ = 0;
 };
 
-/// Pairs in turns over the loads, so that a noisy hour strikes all alike; false if interrupted.
+/// One pair more; false if it failed or was interrupted: what was measured before is kept.
+bool measure_pair(const LatencyOptions& options, const scheduling::Config& config, const PairSetup& setup,
+                  Progress& progress, LatencyRun& run) {
+  const std::size_t done = run.pairs.size();
+  try {
+    run.pairs.push_back(judge_pair(run_pair(setup, options, config, [&](double seconds, std::int64_t late_ns) {
+      progress(setup.load, done, seconds, late_ns);
+    })));
+  } catch (const std::exception& e) {
+    Progress::end_line();
+    std::cerr << "wasp bench latency: " << e.what() << "\n";
+    return false;
+  }
+  Progress::end_line();
+  std::cout << pair_text(run.pairs.back()) << std::flush;
+  return true;
+}
+
+/// Pairs in turns over the loads, so that a noisy hour strikes all alike; false if it ended early.
 bool measure(const LatencyOptions& options, const scheduling::Config& config, LatencyRun& run) {
-  const std::size_t total = options.loads.size() * static_cast<std::size_t>(options.pairs);
-  Progress progress(options, total);
+  Progress progress(options, options.loads.size() * static_cast<std::size_t>(options.pairs));
   for (int i = 0; i < options.pairs; ++i)
-    for (const auto& load : options.loads) {
-      if (interrupted()) return false;
-      const std::size_t done = run.pairs.size();
-      run.pairs.push_back(
-          judge_pair(run_pair(setup_of(load, i, config), options, config,
-                              [&](double seconds, std::int64_t late_ns) { progress(load, done, seconds, late_ns); })));
-      Progress::end_line();
-      std::cout << pair_text(run.pairs.back()) << std::flush;
-    }
+    for (const auto& load : options.loads)
+      if (interrupted() || !measure_pair(options, config, setup_of(load, i, config), progress, run)) return false;
   return true;
 }
 
@@ -94,6 +104,7 @@ int run_latency(const LatencyOptions& options) {
     tools::lock_what_is_mapped();
     std::cout << rt::kernel_description() << ", " << rt::host_description() << "\n" << std::flush;
     const bool whole = measure(options, config, run);
+    run.binding = run.binding && whole;
     if (!run.pairs.empty()) conclude(options, run);
     if (!whole) return 2;
     return all_met(run) ? 0 : 1;
