@@ -22,7 +22,7 @@ class SimCamera {
   /// One thread at a time. Allocates nothing.
   void render(const BodyPose& pose, std::uint32_t frame, std::uint8_t* gray, std::uint16_t* depth_mm,
               const std::function<void()>& almost_done = {});
-  static constexpr int kLastRows = 2;
+  static constexpr int kLastRows = 4;  ///< some 10 to 40 us; a sleeping reader wakes up in about 10
 
   [[nodiscard]] CameraPose camera_pose(const BodyPose& pose) const;
   [[nodiscard]] const Renderer& renderer() const { return renderer_; }

@@ -65,6 +65,7 @@ class Worker {
   }
   /// True once it has ended; `status()` is then that of waitpid.
   bool ended() { return waitpid(pid_, &status_, WNOHANG) == pid_; }
+  [[nodiscard]] pid_t pid() const { return pid_; }
   [[nodiscard]] int status() const { return status_; }
   void tell(int signal) const { kill(pid_, signal); }
 
@@ -92,6 +93,13 @@ class Worker {
   TimeNs beat_at_ns_ = 0, looked_at_ns_ = 0;
   std::uint64_t last_beat_ = 0;
 };
+
+/// iceoryx's socket and lock of a client that could not say good-bye; connect() in iceoryx_runtime.cpp names them.
+void sweep_after(pid_t worker) {
+  const std::string path = "/tmp/wasp-iceoryx-" + std::to_string(worker);
+  unlink(path.c_str());
+  unlink((path + ".lock").c_str());
+}
 
 /// Asked to stop: three seconds for a good-bye, then the end.
 int stop(Worker& worker) {
@@ -143,6 +151,7 @@ int supervise(Shared& shared, const std::function<int(Shared&)>& work) {
   for (int early_deaths = 0; !stop_requested();) {
     Worker worker(work, shared);
     const int code = watch(worker, shared);
+    sweep_after(worker.pid());
     if (code != kReconnect) return code;
     if (stop_requested()) break;
     early_deaths = shared.was_running ? 0 : early_deaths + 1;
