@@ -1,6 +1,6 @@
-// Where the proof ends: the functions without a visible body that real-time code may call, each with the reason why it is
-// taken to be nonblocking. Included ahead of every source in the proof (tests/proof/CMakeLists.txt), and nowhere else: a
-// redeclaration gives the compiler the effect, and the flight code needs no wrapper. docs/contract.md explains.
+// Where the proof ends: the functions without a visible body that real-time code may call, each with the reason why it
+// is taken to be nonblocking. Included ahead of every source in the proof (tests/proof/CMakeLists.txt), and nowhere
+// else: a redeclaration gives the compiler the effect, and the flight code needs no wrapper. docs/contract.md explains.
 #pragma once
 
 #include <fftw3.h>
