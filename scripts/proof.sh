@@ -19,7 +19,7 @@ fly_under_realtime_sanitizer() {
   mkdir -p "$folder"
   ln -sfn "$here/config" "$here/build-rtsan/config"
   cp "$here/build-rtsan/wasp" "$here"/build/wasp-{fly,sim,record,report} "$folder/"
-  "$folder/wasp-fly" --no-rt --seconds 20 --out "$here/build-rtsan/out" --name flight
+  "$folder/wasp-fly" --no-rt --seconds 20 --out "$here/build-rtsan/out"
 }
 
 prove() {
