@@ -1,5 +1,7 @@
-// flow_grid beside what one calls in OpenCV: calcOpticalFlowPyrLK at the same 108 centres, pyramid included. Also, once
-// and without a bar, the two classes the thesis reviews: block matching (SAD) at the centres and dense Horn-Schunck.
+// flow_grid beside what one calls in OpenCV: calcOpticalFlowPyrLK at the same 108 centres, pyramid included, with the
+// thesis' window (10 x 10) and OpenCV's own (21 x 21): first pairs, both pyramids made in the call, then a stream,
+// where both keep the last frame's. Also, once and without a bar, the two classes the thesis reviews: block matching
+// (SAD) at the centres and dense Horn-Schunck.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -7,6 +9,8 @@
 #include <memory>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
+#include <utility>
+#include <vector>
 
 #include "benchmarks/vision_rows.h"
 #include "vision/kernels/flow_grid.h"
@@ -26,15 +30,45 @@ struct PyrLk {
   std::vector<std::uint8_t> status;
   std::vector<float> error;
 
-  PyrLk() {
+  cv::Size window;
+
+  explicit PyrLk(int window_px) : window(window_px, window_px) {
     for (int r = 0; r < kRows; ++r)
       for (int c = 0; c < kColumns; ++c)
         from.emplace_back((static_cast<float>(c) + 0.5f) * kVisionWidth / kColumns - 0.5f,
                           (static_cast<float>(r) + 0.5f) * kVisionHeight / kRows - 0.5f);
   }
   void run(const GrayView& first, const GrayView& second) {
-    cv::calcOpticalFlowPyrLK(mat(first), mat(second), from, to, status, error, {10, 10}, 3);
+    cv::calcOpticalFlowPyrLK(mat(first), mat(second), from, to, status, error, window, 3);
     keep(to);
+  }
+};
+
+/// A stream that goes to and fro between the two frames of a pair: each call makes the new frame's pyramid only.
+struct Stream {
+  vision::FlowGrid grid{kVisionWidth, kVisionHeight, vision::FlowGridParams{}};
+  vision::FlowField field;
+  bool back = false;
+
+  void run(const GrayView& a, const GrayView& b) {
+    grid.follow(back ? b : a, back ? a : b, field);
+    back = !back;
+    keep(field);
+  }
+};
+
+struct PyrLkStream {
+  PyrLk lk{10};
+  std::vector<cv::Mat> kept, made;
+  bool back = false;
+
+  void run(const GrayView& a, const GrayView& b) {
+    if (kept.empty()) cv::buildOpticalFlowPyramid(mat(a), kept, lk.window, 3);
+    cv::buildOpticalFlowPyramid(mat(back ? a : b), made, lk.window, 3);
+    cv::calcOpticalFlowPyrLK(kept, made, lk.from, lk.to, lk.status, lk.error, lk.window, 3);
+    std::swap(kept, made);
+    back = !back;
+    keep(lk.to);
   }
 };
 
@@ -112,19 +146,31 @@ std::vector<VisionRow> flow_grid_rows(const VisionData& data) {
   };
   const auto worst = grid->worst_case();
   for (const auto& [text, count] : {std::pair{"blocks at most ", worst.blocks}, std::pair{", passes ", worst.passes},
-                                    std::pair{", steps ", worst.steps}})
+                                    std::pair{", first guesses ", worst.guesses}})
     row.bound.append(text).append(std::to_string(count));
   row.trips = [=](int i) {
     grid->track(first(i), second(i), *field);
     return grid->trips().passes;
   };
-  const auto lk = std::make_shared<PyrLk>();
+  const auto lk = std::make_shared<PyrLk>(10), lk21 = std::make_shared<PyrLk>(21);
   const auto matching = std::make_shared<BlockMatching>();
   const auto schunck = std::make_shared<HornSchunck>();
   row.peers.push_back({"cv::calcOpticalFlowPyrLK", [=](int i) { lk->run(first(i), second(i)); }, 4});
+  row.peers.push_back({"PyrLK 21x21", [=](int i) { lk21->run(first(i), second(i)); }, 0});
   row.peers.push_back({"block matching", [=](int i) { matching->run(first(i), second(i)); }, 0});
   row.peers.push_back({"Horn-Schunck", [=](int i) { schunck->run(first(i), second(i)); }, 0});
-  return {row};
+
+  VisionRow stream;
+  stream.name = "flow_grid_stream";
+  stream.what = "the same on a stream: the last frame's pyramid is kept, one new one made";
+  stream.inputs = row.inputs;
+  stream.bound = row.bound;
+  const auto ours = std::make_shared<std::vector<Stream>>(data.pairs.size());
+  const auto theirs = std::make_shared<std::vector<PyrLkStream>>(data.pairs.size());
+  stream.ours = [=](int i) { (*ours)[static_cast<std::size_t>(i)].run(first(i), second(i)); };
+  stream.peers.push_back({"buildOpticalFlowPyramid + PyrLK",
+                          [=](int i) { (*theirs)[static_cast<std::size_t>(i)].run(first(i), second(i)); }, 0});
+  return {row, stream};
 }
 
 }  // namespace wasp::bench

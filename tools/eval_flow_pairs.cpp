@@ -128,6 +128,22 @@ std::vector<FlowPair> read_flow_pairs(const fs::path& folder) {
   return pairs;
 }
 
+std::vector<NamedImage> read_still_images(const fs::path& folder) {
+  std::vector<NamedImage> images;
+  std::string prefix;
+  for (const fs::path& file : files_of(folder)) {
+    const std::string stem = file.stem().string();
+    const auto split = split_number(stem);
+    const bool next_of_sequence = split && !images.empty() && split->first == prefix;
+    if (file.extension() != ".png" || next_of_sequence || is_mask(stem) || drivers::probe_image(file).bits != 8)
+      continue;
+    prefix = split ? split->first : "";
+    images.push_back({stem, drivers::load_gray8(file)});
+  }
+  if (images.empty()) throw std::runtime_error(folder.string() + ": no 8-bit PNG files");
+  return images;
+}
+
 std::optional<std::size_t> nearest_known(const DenseFlow& flow, double u_px, double v_px) {
   constexpr long kMostPx = 3;
   const long u0 = std::lround(u_px), v0 = std::lround(v_px);

@@ -30,6 +30,16 @@ struct FlowPair {
 /// and for frames that are missing. KITTI's 16-bit colour files need OpenCV at build time.
 std::vector<FlowPair> read_flow_pairs(const std::filesystem::path& folder);
 
+/// A still image by its name.
+struct NamedImage {
+  std::string name;
+  drivers::Image<std::uint8_t> image;
+};
+
+/// The 8-bit PNG files of a folder, of those that differ in a trailing number alone the first. Throws
+/// std::runtime_error where there is none.
+std::vector<NamedImage> read_still_images(const std::filesystem::path& folder);
+
 /// Index of the known pixel nearest to (u, v), at most 3 px away in each direction.
 std::optional<std::size_t> nearest_known(const DenseFlow& flow, double u_px, double v_px);
 

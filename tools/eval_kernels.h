@@ -29,8 +29,8 @@ std::vector<Figure> eval_foe(const drivers::Recording& recording, const EvalOpti
 /// Time to contact against ttc.csv or gt_per_frame.csv; without them every estimate is a false alarm.
 std::vector<Figure> eval_time_to_contact(const drivers::Recording& recording, const EvalOptions& options);
 
-/// Flow on the grid beside OpenCV's, against ground-truth flow or, without it, made motions of the first frame.
-std::vector<Figure> eval_flow_grid(const drivers::Recording& recording, const EvalOptions& options);
+/// Flow on the grid beside OpenCV's, against ground-truth flow or, without it, made motions of the folder's images.
+std::vector<Figure> eval_flow_grid(const std::filesystem::path& folder, const EvalOptions& options);
 /// Depth from flow and the true camera motion, against true depth (a depth image or a board's plane).
 std::vector<Figure> eval_flow_depth(const drivers::Recording& recording, const EvalOptions& options);
 /// Figures 3.6 and 3.7 from the folder's images, beside cv::phaseCorrelate.
@@ -50,7 +50,8 @@ inline constexpr std::array kEvalKernels = {
     EvalKernel{"heading_rate", &eval_heading_rate, "yaw and height ratio of a downward camera"},
     EvalKernel{"foe", &eval_foe, "focus of expansion of a moving camera"},
     EvalKernel{"time_to_contact", &eval_time_to_contact, "frames to contact from growth of the image"},
-    EvalKernel{"flow_grid", &eval_flow_grid, "flow on a grid, beside OpenCV's pyramidal Lucas-Kanade"},
+    EvalKernel{"flow_grid", nullptr, "flow on a grid, beside OpenCV's pyramidal Lucas-Kanade (any folder of PNG)",
+               &eval_flow_grid},
     EvalKernel{"flow_depth", &eval_flow_depth, "depth from flow and camera motion"},
 };
 

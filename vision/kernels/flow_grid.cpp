@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 
+#include "vision/kernels/flow_grid_centre.h"
 #include "vision/kernels/flow_grid_solve.h"
 
 namespace wasp::vision {
@@ -11,13 +13,14 @@ namespace {
 
 constexpr int kFineAcross = 4, kCoarseAcross = 3;  // tiles a side at level 0, and above
 constexpr int kFirstCoarseLevel = 1;               // from here on a level has its own, coarser grid ...
-constexpr float kCoarsePitchPx = 24.f;             // ... of about this pitch, the size of a coarse block
+constexpr float kCoarsePitchPx = 40.f;             // ... of about this pitch
 constexpr float kSameStartPx = 0.5f;               // starts closer than this lead to the same place
+constexpr float kGoodCentreGray = 1.5f;            // a centre that matches this well needs no other guess
 constexpr int kMinTiles = 4;
 
-float distance(const CellMotion& a, const CellMotion& b) noexcept {
+float distance2(const CellMotion& a, const CellMotion& b) noexcept {
   const float u = a.u_px - b.u_px, v = a.v_px - b.v_px;
-  return std::sqrt(u * u + v * v);
+  return u * u + v * v;
 }
 
 bool finite(const CellMotion& m) noexcept {
@@ -33,15 +36,8 @@ FlowGridParams checked(const FlowGridParams& p) {
   return p;
 }
 
-float median_of(std::array<float, 9>& values, int count) noexcept {
-  for (int i = 1; i < count; ++i)
-    for (int j = i; j > 0; --j) {
-      float &a = values[static_cast<std::size_t>(j - 1)], &b = values[static_cast<std::size_t>(j)];
-      const float low = std::min(a, b);
-      b = std::max(a, b);
-      a = low;
-    }
-  return values[static_cast<std::size_t>(count / 2)];
+bool same_start(const CellMotion& a, const CellMotion& b) noexcept {
+  return distance2(a, b) <= kSameStartPx * kSameStartPx;
 }
 
 }  // namespace
@@ -60,7 +56,39 @@ struct FlowGrid::Level {
 struct FlowGrid::Fit {
   BlockSite site;
   TileBlock block;
+  BlockErrors errors;
   BlockSums sums;
+};
+
+/// First guesses that differ, each tried at the cell's very centre; of equals the first added is best.
+class FlowGrid::Guesses {
+ public:
+  Guesses(const GrayView& first, const GrayView& second, const BlockSite& site, const CellMotion& own) noexcept
+      : first_(first),
+        second_(second),
+        u_px_(place(site.centre_u, kCentreWidthPx, first.width_px)),
+        v_px_(place(site.centre_v, kCentreHeightPx, first.height_px)) {
+    add(own);
+  }
+  void add(const CellMotion& guess) noexcept {
+    for (int i = 0; i < count_; ++i)
+      if (same_start(list_[static_cast<std::size_t>(i)], guess)) return;
+    const float cost = centre_cost(first_, second_, u_px_, v_px_, guess.u_px, guess.v_px);
+    if (count_ == 0 || cost < least_) best_ = count_, least_ = cost;
+    list_[static_cast<std::size_t>(count_++)] = guess;
+  }
+  [[nodiscard]] int count() const noexcept { return count_; }
+  [[nodiscard]] float least_cost() const noexcept { return least_; }
+  [[nodiscard]] const CellMotion& best() const noexcept { return list_[static_cast<std::size_t>(best_)]; }
+
+ private:
+  static int place(float centre, int size, int image_size) noexcept {
+    return std::clamp(static_cast<int>(centre + 1.f) - size / 2, 0, image_size - size);
+  }
+  const GrayView &first_, &second_;
+  int u_px_, v_px_, count_ = 0, best_ = 0;
+  float least_ = 0;
+  std::array<CellMotion, kMaxGuesses> list_;
 };
 
 FlowGrid::FlowGrid(int width_px, int height_px, const FlowGridParams& params)
@@ -91,11 +119,11 @@ FlowGridTrips FlowGrid::worst_case() const noexcept {
     const int blocks = l.columns * l.rows;
     const int steps = i < kFirstCoarseLevel ? params_.max_steps : 2 * params_.max_steps;
     most.blocks += blocks;
-    most.steps += blocks * steps;
-    most.passes += blocks * (steps + 3);
+    most.passes += blocks * steps;
+    most.guesses += i + 1 < first_.levels() ? blocks * kMaxGuesses : 0;
   }
   const int runs = params_.max_backward_px > 0.f ? 2 : 1;
-  return {most.blocks * runs, most.passes * runs, most.steps * runs};
+  return {most.blocks * runs, most.passes * runs, most.guesses * runs};
 }
 
 void FlowGrid::clear(FlowField& out) const noexcept {
@@ -111,10 +139,21 @@ void FlowGrid::clear(FlowField& out) const noexcept {
 }
 
 void FlowGrid::track(const GrayView& first, const GrayView& second, FlowField& out) noexcept {
+  solve(first_.build(first), second, out);
+}
+
+void FlowGrid::follow(const GrayView& first, const GrayView& second, FlowField& out) noexcept {
+  if (!kept_) return track(first, second, out);
+  std::swap(first_, second_);
+  solve(first_.renew(first), second, out);
+}
+
+void FlowGrid::solve(bool built, const GrayView& second, FlowField& out) noexcept {
   trips_ = {};
   motions_ = {};
   clear(out);
-  if (!first_.build(first) || !second_.build(second)) return;
+  kept_ = built && second_.build(second);
+  if (!kept_) return;
   run(first_, second_, motions_, out);
   if (params_.max_backward_px > 0.f) check_backward(out);
 }
@@ -126,14 +165,19 @@ void FlowGrid::run(const FlowPyramid& from, const FlowPyramid& to, Motions& moti
     const Level level = level_of(i);
     const bool top = i == from.levels() - 1;
     const int steps = i < kFirstCoarseLevel ? params_.max_steps : 2 * params_.max_steps;
-    if (!top) std::copy_n(motions.begin(), above.columns * above.rows, above_.begin());
+    for (std::size_t k = 0; !top && k < static_cast<std::size_t>(above.columns * above.rows); ++k) {
+      above_[k] = motions[k];
+      above_[k].u_px *= 2.f;
+      above_[k].v_px *= 2.f;
+    }
     for (int cell = 0; cell < level.columns * level.rows; ++cell) {
       fit.site.centre_u = level.u_px(cell % level.columns);
       fit.site.centre_v = level.v_px(cell / level.columns);
+      fit.site.with_gray = i == 0;
       fit.site.across = i == 0 ? kFineAcross : kCoarseAcross;
       cut(from.level(i), fit);
       CellMotion& motion = motions[static_cast<std::size_t>(cell)];
-      motion = top ? CellMotion{} : start(above, above_, to.level(i), fit);
+      motion = top ? CellMotion{} : start(above, from.level(i), to.level(i), fit.site);
       refine(to.level(i), steps, motion, fit);
       if (i == 0) judge(fit, motion, out.cells[static_cast<std::size_t>(cell)]);
     }
@@ -141,29 +185,28 @@ void FlowGrid::run(const FlowPyramid& from, const FlowPyramid& to, Motions& moti
   }
 }
 
-/// The better of two first guesses from the level above: its nearest cell, extrapolated, and the median around it.
-CellMotion FlowGrid::start(const Level& above, const Motions& motions_above, const GrayView& second,
-                           Fit& fit) noexcept {
-  const float u = (fit.site.centre_u + 0.5f) * 0.5f - 0.5f, v = (fit.site.centre_v + 0.5f) * 0.5f - 0.5f;
+/// The motion of the nearest cell at the level above, extrapolated, unless one of its neighbours' fits the very centre
+/// better.
+CellMotion FlowGrid::start(const Level& above, const GrayView& first, const GrayView& second,
+                           const BlockSite& site) noexcept {
+  const float u = (site.centre_u + 0.5f) * 0.5f - 0.5f, v = (site.centre_v + 0.5f) * 0.5f - 0.5f;
   const int c0 = std::clamp(static_cast<int>((u + 0.5f) / above.pitch_u_px), 0, above.columns - 1);
   const int r0 = std::clamp(static_cast<int>((v + 0.5f) / above.pitch_v_px), 0, above.rows - 1);
-  std::array<float, 9> us{}, vs{};
-  int count = 0;
-  for (int r = std::max(r0 - 1, 0); r <= std::min(r0 + 1, above.rows - 1); ++r)
-    for (int c = std::max(c0 - 1, 0); c <= std::min(c0 + 1, above.columns - 1); ++c, ++count) {
-      const CellMotion& m = motions_above[static_cast<std::size_t>(r * above.columns + c)];
-      us[static_cast<std::size_t>(count)] = m.u_px;
-      vs[static_cast<std::size_t>(count)] = m.v_px;
-    }
-  CellMotion own = motions_above[static_cast<std::size_t>(r0 * above.columns + c0)];
-  const float x = u - above.u_px(c0), y = v - above.v_px(r0);
-  own.u_px = 2.f * (own.u_px + own.du_dx * x + own.du_dy * y);
-  own.v_px = 2.f * (own.v_px + own.dv_dx * x + own.dv_dy * y);
-  CellMotion around;
-  around.u_px = 2.f * median_of(us, count);
-  around.v_px = 2.f * median_of(vs, count);
-  if (distance(own, around) <= kSameStartPx) return own;
-  return compare(second, around, fit) < compare(second, own, fit) ? around : own;
+  const auto extrapolated = [&](int c, int r) {
+    CellMotion m = above_[static_cast<std::size_t>(r * above.columns + c)];
+    const float x = 2.f * (u - above.u_px(c)), y = 2.f * (v - above.v_px(r));
+    m.u_px += m.du_dx * x + m.du_dy * y;
+    m.v_px += m.dv_dx * x + m.dv_dy * y;
+    return m;
+  };
+  const CellMotion own = extrapolated(c0, r0);
+  Guesses guesses(first, second, site, own);
+  const int reach = guesses.least_cost() <= kGoodCentreGray ? 0 : 1;
+  for (int r = std::max(r0 - reach, 0); r <= std::min(r0 + reach, above.rows - 1); ++r)
+    for (int c = std::max(c0 - reach, 0); c <= std::min(c0 + reach, above.columns - 1); ++c)
+      guesses.add(extrapolated(c, r));
+  trips_.guesses += guesses.count();
+  return guesses.best();
 }
 
 void FlowGrid::cut(const GrayView& first, Fit& fit) noexcept {
@@ -179,28 +222,22 @@ void FlowGrid::cut(const GrayView& first, Fit& fit) noexcept {
   cut_block(first, fit.site, fit.block);
 }
 
-float FlowGrid::compare(const GrayView& second, const CellMotion& motion, Fit& fit) noexcept {
-  ++trips_.passes;
-  compare_block(fit.block, second, motion, fit.sums);
-  return fit.sums.cost;
-}
-
 void FlowGrid::refine(const GrayView& second, int max_steps, CellMotion& motion, Fit& fit) noexcept {
   const CellMotion prior = motion;
   for (int i = 0; i < max_steps; ++i) {
-    compare(second, motion, fit);
+    ++trips_.passes;
+    compare_block(fit.block, second, motion, fit.errors, fit.sums);
     const CellMotion before = motion;
     if (!step(motion, prior, fit)) {
       motion = before;
       break;
     }
-    if (distance(before, motion) < params_.converged_px) break;
+    if (distance2(before, motion) < params_.converged_px * params_.converged_px) break;
   }
 }
 
 /// One robust, regularised Gauss-Newton step. False when it has no finite solution.
 bool FlowGrid::step(CellMotion& motion, const CellMotion& prior, Fit& fit) noexcept {
-  ++trips_.steps;
   const float noise = params_.noise_gray * params_.noise_gray;
   const float shift = noise / (params_.shift_sigma_px * params_.shift_sigma_px);
   const float affine = noise / (params_.affine_sigma * params_.affine_sigma * kAffineScalePx * kAffineScalePx);
@@ -217,23 +254,24 @@ bool FlowGrid::step(CellMotion& motion, const CellMotion& prior, Fit& fit) noexc
 }
 
 /// One sigma of the shift's worse direction, its affine terms known: the tiles' noise over the least eigenvalue.
-float FlowGrid::shift_sigma_px(const BlockSums& sums) const noexcept {
+float FlowGrid::shift_sigma_px(const BlockSums& sums, const BlockMatch& match) const noexcept {
   const float half = 0.5f * (sums.xx[0] - sums.yy[0]);
   const float least = 0.5f * (sums.xx[0] + sums.yy[0]) - std::sqrt(half * half + sums.xy[0] * sums.xy[0]);
-  const float noise = std::max(params_.noise_gray * params_.noise_gray, sums.squares);
-  return std::sqrt(noise / std::max(least, 1e-6f));
+  const float noise = std::max(params_.noise_gray * params_.noise_gray, match.squares);
+  return std::sqrt(noise * match.trust / std::max(least, 1e-6f));
 }
 
 void FlowGrid::judge(const Fit& fit, const CellMotion& motion, FlowCell& cell) const noexcept {
-  const float pixels = static_cast<float>(fit.block.tiles() * kTilePixels);
+  const BlockMatch match = match_of(fit.block, fit.errors);
+  const float pixels = static_cast<float>(fit.block.tiles * kTilePixels);
   const float mean = fit.block.gray_sum / pixels;
   const float variance = fit.block.gray_squares / pixels - mean * mean;
   cell.u_px = motion.u_px;
   cell.v_px = motion.v_px;
-  cell.residual = std::sqrt(fit.sums.squares);
-  cell.quality = std::clamp(1.f - fit.sums.cost, 0.f, 1.f);
-  const bool good = variance >= params_.min_variance && fit.sums.inside >= kMinTiles &&
-                    shift_sigma_px(fit.sums) <= params_.max_flow_sigma_px;
+  cell.residual = std::sqrt(match.squares);
+  cell.quality = std::clamp(1.f - match.cost, 0.f, 1.f);
+  const bool good = variance >= params_.min_variance && match.inside >= kMinTiles &&
+                    shift_sigma_px(fit.sums, match) <= params_.max_flow_sigma_px;
   cell.valid = good ? 1 : 0;
 }
 
