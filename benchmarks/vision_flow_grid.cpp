@@ -1,7 +1,6 @@
 // flow_grid beside what one calls in OpenCV: calcOpticalFlowPyrLK at the same 108 centres, pyramid included, with the
-// thesis' window (10 x 10) and OpenCV's own (21 x 21): first pairs, both pyramids made in the call, then a stream,
-// where both keep the last frame's. Also, once and without a bar, the two classes the thesis reviews: block matching
-// (SAD) at the centres and dense Horn-Schunck.
+// thesis' window (10 x 10) and OpenCV's own (21 x 21). Also, once and without a bar, the two classes the thesis reviews:
+// block matching (SAD) at the centres and dense Horn-Schunck.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -41,34 +40,6 @@ struct PyrLk {
   void run(const GrayView& first, const GrayView& second) {
     cv::calcOpticalFlowPyrLK(mat(first), mat(second), from, to, status, error, window, 3);
     keep(to);
-  }
-};
-
-/// A stream that goes to and fro between the two frames of a pair: each call makes the new frame's pyramid only.
-struct Stream {
-  vision::FlowGrid grid{kVisionWidth, kVisionHeight, vision::FlowGridParams{}};
-  vision::FlowField field;
-  bool back = false;
-
-  void run(const GrayView& a, const GrayView& b) {
-    grid.follow(back ? b : a, back ? a : b, field);
-    back = !back;
-    keep(field);
-  }
-};
-
-struct PyrLkStream {
-  PyrLk lk{10};
-  std::vector<cv::Mat> kept, made;
-  bool back = false;
-
-  void run(const GrayView& a, const GrayView& b) {
-    if (kept.empty()) cv::buildOpticalFlowPyramid(mat(a), kept, lk.window, 3);
-    cv::buildOpticalFlowPyramid(mat(back ? a : b), made, lk.window, 3);
-    cv::calcOpticalFlowPyrLK(kept, made, lk.from, lk.to, lk.status, lk.error, lk.window, 3);
-    std::swap(kept, made);
-    back = !back;
-    keep(lk.to);
   }
 };
 
@@ -159,18 +130,7 @@ std::vector<VisionRow> flow_grid_rows(const VisionData& data) {
   row.peers.push_back({"PyrLK 21x21", [=](int i) { lk21->run(first(i), second(i)); }, 0});
   row.peers.push_back({"block matching", [=](int i) { matching->run(first(i), second(i)); }, 0});
   row.peers.push_back({"Horn-Schunck", [=](int i) { schunck->run(first(i), second(i)); }, 0});
-
-  VisionRow stream;
-  stream.name = "flow_grid_stream";
-  stream.what = "the same on a stream: the last frame's pyramid is kept, one new one made";
-  stream.inputs = row.inputs;
-  stream.bound = row.bound;
-  const auto ours = std::make_shared<std::vector<Stream>>(data.pairs.size());
-  const auto theirs = std::make_shared<std::vector<PyrLkStream>>(data.pairs.size());
-  stream.ours = [=](int i) { (*ours)[static_cast<std::size_t>(i)].run(first(i), second(i)); };
-  stream.peers.push_back({"buildOpticalFlowPyramid + PyrLK",
-                          [=](int i) { (*theirs)[static_cast<std::size_t>(i)].run(first(i), second(i)); }, 0});
-  return {row, stream};
+  return {row};
 }
 
 }  // namespace wasp::bench

@@ -51,11 +51,7 @@ HWY_INLINE auto load_rows(const std::uint8_t* p, std::ptrdiff_t stride) {
 HWY_INLINE Ints multiply_add(Shorts a, Shorts b, Ints acc) {
   Ints rest = hn::Zero(kInts);
   acc = hn::ReorderWidenMulAccumulate(kInts, a, b, acc, rest);
-#if HWY_ARCH_X86
-  return acc;
-#else
-  return hn::Add(acc, rest);
-#endif
+  return hn::Add(acc, rest);  // of zeros where the machine adds neighbours itself
 }
 
 /// Sums of 4 integers, or more blocks of 4, as one block.

@@ -46,7 +46,7 @@ class FlowPyramid {
 
 /// One halving step: `out` holds (width/2) x (height/2) pixels, row after row with `out_stride_px`, which must leave
 /// room for a multiple of kMostLanes. Of every row of `in` the first `readable_px` (>= width) bytes may be read.
-/// `scratch` holds readable_px + 6 kMostLanes bytes. SIMD, the same result on every machine. Realtime-safe: yes.
+/// `scratch` holds scratch_bytes(readable_px). SIMD, the same result on every machine. Realtime-safe: yes.
 void halve_image(const GrayView& in, int readable_px, std::uint8_t* out, int out_stride_px,
                  std::uint8_t* scratch) WASP_REALTIME;
 
