@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
-#include <utility>
 
 #include "vision/kernels/flow_grid_centre.h"
 #include "vision/kernels/flow_grid_solve.h"
@@ -93,13 +92,12 @@ class FlowGrid::Guesses {
 
 FlowGrid::FlowGrid(int width_px, int height_px, const FlowGridParams& params)
     : params_(checked(params)),
-      first_(width_px, height_px, params.levels),
-      second_(width_px, height_px, params.levels) {
-  if (first_.levels() == 0) throw std::invalid_argument("flow_grid: image too small");
+      pyramids_{FlowPyramid(width_px, height_px, params.levels), FlowPyramid(width_px, height_px, params.levels)} {
+  if (pyramids_[0].levels() == 0) throw std::invalid_argument("flow_grid: image too small");
 }
 
 FlowGrid::Level FlowGrid::level_of(int level) const noexcept {
-  const GrayView& image = first_.level(0);
+  const GrayView& image = pyramids_[0].level(0);
   const float scale = 1.f / static_cast<float>(1 << level);
   const float width = static_cast<float>(image.width_px) * scale, height = static_cast<float>(image.height_px) * scale;
   Level l{params_.columns, params_.rows};
@@ -114,13 +112,13 @@ FlowGrid::Level FlowGrid::level_of(int level) const noexcept {
 
 FlowGridTrips FlowGrid::worst_case() const noexcept {
   FlowGridTrips most;
-  for (int i = 0; i < first_.levels(); ++i) {
+  for (int i = 0; i < pyramids_[0].levels(); ++i) {
     const Level l = level_of(i);
     const int blocks = l.columns * l.rows;
     const int steps = i < kFirstCoarseLevel ? params_.max_steps : 2 * params_.max_steps;
     most.blocks += blocks;
     most.passes += blocks * steps;
-    most.guesses += i + 1 < first_.levels() ? blocks * kMaxGuesses : 0;
+    most.guesses += i + 1 < pyramids_[0].levels() ? blocks * kMaxGuesses : 0;
   }
   const int runs = params_.max_backward_px > 0.f ? 2 : 1;
   return {most.blocks * runs, most.passes * runs, most.guesses * runs};
@@ -139,22 +137,22 @@ void FlowGrid::clear(FlowField& out) const noexcept {
 }
 
 void FlowGrid::track(const GrayView& first, const GrayView& second, FlowField& out) noexcept {
-  solve(first_.build(first), second, out);
+  solve(this->first().build(first), second, out);
 }
 
 void FlowGrid::follow(const GrayView& first, const GrayView& second, FlowField& out) noexcept {
   if (!kept_) return track(first, second, out);
-  std::swap(first_, second_);
-  solve(first_.renew(first), second, out);
+  first_ = 1 - first_;
+  solve(this->first().renew(first), second, out);
 }
 
 void FlowGrid::solve(bool built, const GrayView& second, FlowField& out) noexcept {
   trips_ = {};
   motions_ = {};
   clear(out);
-  kept_ = built && second_.build(second);
+  kept_ = built && this->second().build(second);
   if (!kept_) return;
-  run(first_, second_, motions_, out);
+  run(this->first(), this->second(), motions_, out);
   if (params_.max_backward_px > 0.f) check_backward(out);
 }
 
@@ -278,7 +276,7 @@ void FlowGrid::judge(const Fit& fit, const CellMotion& motion, FlowCell& cell) c
 /// Each valid cell must come back to where it started by the backward motion of the cell it lands in.
 void FlowGrid::check_backward(FlowField& out) noexcept {
   clear(backward_field_);
-  run(second_, first_, backward_, backward_field_);
+  run(second(), first(), backward_, backward_field_);
   const Level cells = level_of(0);
   for (int i = 0; i < out.count(); ++i) {
     FlowCell& cell = out.cells[static_cast<std::size_t>(i)];

@@ -66,6 +66,8 @@ class FlowGrid {
   static constexpr int kMaxCells = FlowField::kMaxColumns * FlowField::kMaxRows;
   using Motions = std::array<CellMotion, static_cast<std::size_t>(kMaxCells)>;
   static constexpr int kMaxGuesses = 9;
+  [[nodiscard]] FlowPyramid& first() WASP_REALTIME { return pyramids_[first_]; }
+  [[nodiscard]] FlowPyramid& second() WASP_REALTIME { return pyramids_[1 - first_]; }
   struct Level;
   struct Fit;
   class Guesses;
@@ -84,8 +86,9 @@ class FlowGrid {
   void check_backward(FlowField& out) WASP_REALTIME;
 
   FlowGridParams params_;
-  FlowPyramid first_, second_;
-  bool kept_ = false;  ///< second_ holds the last call's second image
+  std::array<FlowPyramid, 2> pyramids_;
+  std::size_t first_ = 0;  ///< which of them is the first image's
+  bool kept_ = false;      ///< the other holds the last call's second image
   Motions motions_{}, backward_{};
   Motions above_{};  ///< of the level above, shifts in pixels of this one
   FlowField backward_field_;

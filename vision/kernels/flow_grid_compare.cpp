@@ -67,9 +67,10 @@ void compare_tiles(const TileBlock& block, const GrayView& second, const Targets
 
 #else
 
+alignas(16) constexpr std::uint8_t kPairs[16] = {0, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5, 6, 6, 7, 7, 8};
+
 /// Neighbouring bytes (i, i + 1), (i + 1, i + 2) ... from `first` on, as 8 pairs in every row.
 HWY_INLINE Bytes pairs_from(int first) {
-  alignas(16) static constexpr std::uint8_t kPairs[16] = {0, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5, 6, 6, 7, 7, 8};
   return hn::Add(hn::LoadDup128(kBytes, kPairs), hn::Set(kBytes, static_cast<std::uint8_t>(first)));
 }
 

@@ -35,14 +35,15 @@ struct CutTables {
   Ints first_row;  ///< row of a lane in a tile's first vector
 };
 
+alignas(16) constexpr std::uint8_t kSpread[16] = {0, 0x80, 1, 0x80, 2, 0x80, 3, 0x80,
+                                                  4, 0x80, 5, 0x80, 6, 0x80, 7, 0x80};
+alignas(16) constexpr std::int16_t kColumnOf[8] = {0, 1, 2, 3, 4, 5, 6, 7};
+alignas(64) constexpr std::int32_t kBlocks[16] = {0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3};
+
 HWY_INLINE CutTables make_tables() {
-  alignas(16) static constexpr std::uint8_t kSpread[16] = {0, 0x80, 1, 0x80, 2, 0x80, 3, 0x80,
-                                                           4, 0x80, 5, 0x80, 6, 0x80, 7, 0x80};
-  alignas(16) static constexpr std::int16_t kColumns[8] = {0, 1, 2, 3, 4, 5, 6, 7};
-  alignas(64) static constexpr std::int32_t kBlocks[16] = {0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3};
   const auto left = hn::LoadDup128(kBytes, kSpread), one = hn::Set(kBytes, std::uint8_t{1});
   const auto middle = hn::Add(left, one);
-  return {left, middle, hn::Add(middle, one), hn::LoadDup128(kShorts, kColumns),
+  return {left, middle, hn::Add(middle, one), hn::LoadDup128(kShorts, kColumnOf),
           hn::Mul(hn::Load(kInts, kBlocks), hn::Set(kInts, static_cast<std::int32_t>(kSteps)))};
 }
 
