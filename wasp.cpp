@@ -12,6 +12,7 @@
 
 #include "rt/contract.h"
 #include "scheduling/flight.h"
+#include "scheduling/plan.h"
 #include "vision/edge_altitude.h"
 #include "vision/ground_altitude.h"
 
@@ -29,6 +30,7 @@ constexpr const char* kUsage =
     "usage: wasp SUBCOMMAND [options]    (wasp SUBCOMMAND --help for each)\n"
     "  fly      fly a mission, in the simulator or on a recording, and write a report\n"
     "  flight   the flying process alone (fly starts it)\n"
+    "  plan     can the thread table keep its deadlines? response times, before any flight\n"
     "  sim      the simulator: camera and autopilot as another process\n"
     "  world    make and look at simulated worlds, VRML97 files\n"
     "  top      live rates, ages and latencies of a running flight, read-only\n"
@@ -58,5 +60,6 @@ int main(int argc, char** argv) {
     return argc < 2 ? 2 : 0;
   }
   if (std::strcmp(argv[1], "flight") == 0) return scheduling::flight_main(kBehaviours, argc - 1, argv + 1);
+  if (std::strcmp(argv[1], "plan") == 0) return scheduling::plan_main(kBehaviours, argc - 1, argv + 1);
   return run_sister(argv[1], argv + 1);
 }

@@ -1,6 +1,6 @@
 // The arbiter turns the newest cue of every behaviour into one intention. A cue older than its age limit is absent.
 // Avoid wins over everything else a behaviour says; heading and pitch are weighted sums; height comes from the first
-// source in the fallback order that can see.
+// source in the fallback order that can see; one that is at this moment over its time budget is asked last.
 #pragma once
 
 #include <array>
@@ -29,6 +29,7 @@ struct ArbiterParams {
 struct CueSet {
   std::array<Cue, kMaxBehaviours> cues{};
   std::array<bool, kMaxBehaviours> present{};
+  std::array<bool, kMaxBehaviours> overdue{};  ///< its step is running longer than its budget at this moment
 };
 
 struct Intention {
@@ -40,6 +41,7 @@ struct Intention {
   float heading_rate_radps = 0;
   float pitch_rad = 0;
   TimeNs oldest_exposed_at_ns = kNever;  ///< oldest evidence in this intention
+  TimeNs usable_until_ns = kForever;     ///< when the first of its evidence reaches its age limit
 };
 
 /// True if the cue may be used at `now_ns`: valid, finite, made within its budget and within its age limit.

@@ -76,7 +76,49 @@ Setpoint by_mode(const ControlParams& p, const ControlInput& in, FlightMode mode
   return neutral;
 }
 
+/// Through the limits, from the last setpoint sent, into the command.
+void put_setpoint(const ControlParams& p, const ControlInput& in, const Setpoint& chosen, ControlState& s,
+                  Command& c) noexcept {
+  s.sent = s.sent_before;
+  if (!limit(p.limits, chosen, in.dt_s, s.sent)) s.sent = Setpoint{};  // cannot happen: neutral is finite
+  const Quat q = quat_from_euler(
+      {s.sent.roll_rad, s.sent.pitch_rad, in.attitude_present ? euler_from_quat(attitude_of(in)).yaw_rad : 0.f});
+  c.q_ned_body = {q.w(), q.x(), q.y(), q.z()};
+  c.yaw_rate_radps = s.sent.yaw_rate_radps;
+  c.thrust = s.sent.thrust;
+  c.mode = s.mode.mode;
+  c.reason = s.mode.reason;
+  const bool not_ours = in.autopilot.heard_at_ns == kNever || s.mission.phase == MissionPhase::kBroken;
+  const bool stopped = s.mode.mode == FlightMode::kFailsafe && p.failsafe_action == FailsafeAction::kStopStream;
+  c.sent = !not_ours && !stopped;
+}
+
+/// Until when the chosen setpoint may go out: only a flying mode that obeys cues or attitude rests on them.
+void put_age_limits(const ControlParams& p, const ControlInput& in, const Intention& intention, FlightMode mode,
+                    ControlOutput& out) noexcept {
+  if (mode != FlightMode::kBehaviour && mode != FlightMode::kHold) return;
+  out.attitude_until_ns = in.attitude.exposed_at_ns + p.attitude_age_limit_ns;
+  if (mode == FlightMode::kBehaviour) out.cue_until_ns = intention.usable_until_ns;
+}
+
 }  // namespace
+
+Refusal refusal_at(const ControlOutput& output, TimeNs now_ns) noexcept {
+  if (now_ns > output.attitude_until_ns) return Refusal::kAttitudeTooOld;
+  if (now_ns > output.cue_until_ns) return Refusal::kCueTooOld;
+  return Refusal::kNone;
+}
+
+void refuse(const ControlParams& p, const ControlInput& in, Refusal refusal, ControlState& s,
+            ControlOutput& out) noexcept {
+  Setpoint wanted;
+  wanted.thrust = out.command.thrust;
+  s.mode = {refusal == Refusal::kCueTooOld ? FlightMode::kHold : FlightMode::kFailsafe, ModeReason::kTooOld};
+  put_setpoint(p, in, by_mode(p, in, s.mode.mode, wanted), s, out.command);
+  out.command.exposed_at_ns = kNever;
+  out.command.cue_source = -1;
+  out.command.refused = static_cast<std::uint8_t>(refusal);
+}
 
 ControlOutput control_step(const ControlParams& p, const ControlInput& in, ControlState& s) noexcept {
   const Intention intention = arbitrate(p.arbiter, in.cues, in.now_ns);
@@ -91,32 +133,23 @@ ControlOutput control_step(const ControlParams& p, const ControlInput& in, Contr
                     s.height.height_m, s.height.climb_rate_mps, in.stop_requested, in.autopilot.heard_at_ns != kNever},
                    s.mission);
   const Setpoint wanted = wanted_setpoint(p, in, intention, wish, s);
+  s.sent_before = s.sent;
   Setpoint probe = s.sent;
   const bool finite = limit(p.limits, wanted, in.dt_s, probe);
   flight_mode_step(assess(p, in, intention, s, finite), s.mode);
 
   const bool standing = !wish.rotors && s.mode.mode != FlightMode::kManual;
   const Setpoint chosen = standing ? Setpoint{} : by_mode(p, in, s.mode.mode, wanted);
-  if (!limit(p.limits, chosen, in.dt_s, s.sent)) s.sent = Setpoint{};  // cannot happen: neutral is finite
-
   ControlOutput out;
   Command& c = out.command;
-  const Quat q = quat_from_euler(
-      {s.sent.roll_rad, s.sent.pitch_rad, in.attitude_present ? euler_from_quat(attitude_of(in)).yaw_rad : 0.f});
-  c.q_ned_body = {q.w(), q.x(), q.y(), q.z()};
-  c.yaw_rate_radps = s.sent.yaw_rate_radps;
-  c.thrust = s.sent.thrust;
+  put_setpoint(p, in, chosen, s, c);
+  if (!standing) put_age_limits(p, in, intention, s.mode.mode, out);
   c.exposed_at_ns = intention.oldest_exposed_at_ns;
   c.cue_source = intention.height_source;
   c.height_setpoint_m = wish.rotors ? s.altitude_hold.setpoint_m : 0.f;
   c.height_m = s.height.height_m;
   c.climb_rate_mps = s.height.climb_rate_mps;
-  c.mode = s.mode.mode;
-  c.reason = s.mode.reason;
   c.mission_phase = static_cast<std::uint8_t>(s.mission.phase);
-  const bool not_ours = in.autopilot.heard_at_ns == kNever || s.mission.phase == MissionPhase::kBroken;
-  const bool stopped = s.mode.mode == FlightMode::kFailsafe && p.failsafe_action == FailsafeAction::kStopStream;
-  c.sent = !not_ours && !stopped;
   out.ask_arm = wish.armed && !(in.autopilot.armed && in.autopilot.follows) && s.mission.phase == MissionPhase::kArm;
   out.ask_disarm = wish.disarm && in.autopilot.armed;
   return out;

@@ -51,19 +51,32 @@ struct ControlInput {
 struct ControlState {
   HeightFilterState height;
   AltitudeHoldState altitude_hold;
-  Setpoint sent;
+  Setpoint sent, sent_before;  ///< of this tick and of the one before
   ModeState mode;
   MissionState mission;
   TimeNs ground_seen_at_ns = kNever;
 };
 
-/// The command, and what to ask of the autopilot besides.
+/// The command, what to ask of the autopilot besides, and until when the command may go out.
 struct ControlOutput {
   Command command;
   bool ask_arm = false, ask_disarm = false;
+  TimeNs cue_until_ns = kForever;       ///< a cue it rests on reaches its age limit
+  TimeNs attitude_until_ns = kForever;  ///< the attitude it rests on does
 };
+
+/// Why a command must not go out at the moment it would: the age limits, asked again right before the bytes leave.
+enum class Refusal : std::uint8_t { kNone = 0, kCueTooOld = 1, kAttitudeTooOld = 2 };
+
+/// Realtime-safe: yes.
+Refusal refusal_at(const ControlOutput& output, TimeNs now_ns) WASP_REALTIME;
 
 /// Realtime-safe: yes. Command::sent is 1 when the setpoint must go out, 0 when the stream stops on purpose.
 ControlOutput control_step(const ControlParams& params, const ControlInput& input, ControlState& state) WASP_REALTIME;
+
+/// Puts in the place of a refused command what the flight mode says of the loss: hold for a cue, failsafe for the
+/// attitude, through the same limits. `refusal` != kNone. Realtime-safe: yes.
+void refuse(const ControlParams& params, const ControlInput& input, Refusal refusal, ControlState& state,
+            ControlOutput& output) WASP_REALTIME;
 
 }  // namespace wasp::control

@@ -62,7 +62,8 @@ const char* name_of(ModeReason reason) noexcept {
                                  "autopilot left our mode",
                                  "deadlines missed",
                                  "stop requested",
-                                 "landed"};
+                                 "landed",
+                                 "too old at the wire"};
   const auto i = static_cast<std::size_t>(reason);
   return i < kNames.size() ? kNames[i] : "unknown";
 }

@@ -14,6 +14,11 @@ void enter(MissionState& s, MissionPhase phase, TimeNs now_ns) noexcept {
   s.settled_since_ns = kNever;
 }
 
+void end_early(MissionState& s, MissionPhase phase, EarlyEnd why, TimeNs now_ns) noexcept {
+  s.early_end = why;
+  enter(s, phase, now_ns);
+}
+
 MissionPhase leg_phase(int i) noexcept { return static_cast<MissionPhase>(static_cast<int>(MissionPhase::kLeg0) + i); }
 
 bool standing_long_enough(const MissionInput& in, MissionState& s) noexcept {
@@ -29,11 +34,11 @@ MissionWish wait_and_arm(const MissionParams& p, const MissionInput& in, Mission
   MissionWish wish;
   const bool ready = in.heard && (in.ground_seen || p.follow_recording);
   if (s.phase == MissionPhase::kWait && in.heard && in.armed) {
-    enter(s, MissionPhase::kBroken, in.now_ns);  // armed by somebody else, perhaps in the air: not ours to take over
+    end_early(s, MissionPhase::kBroken, EarlyEnd::kFoundArmed, in.now_ns);  // perhaps in the air: not ours
   } else if (in.stop_requested) {
-    enter(s, in.armed ? MissionPhase::kDisarm : MissionPhase::kDone, in.now_ns);
+    end_early(s, in.armed ? MissionPhase::kDisarm : MissionPhase::kDone, EarlyEnd::kStopped, in.now_ns);
   } else if (in_phase_s > static_cast<double>(p.patience_s)) {
-    enter(s, MissionPhase::kBroken, in.now_ns);
+    end_early(s, MissionPhase::kBroken, EarlyEnd::kNoPatience, in.now_ns);
   } else if (s.phase == MissionPhase::kWait && ready) {
     s.ground_height_m = in.height_m;
     enter(s, MissionPhase::kArm, in.now_ns);
@@ -57,9 +62,9 @@ MissionWish fly_leg(const MissionParams& p, const MissionInput& in, MissionState
   wish.armed = true;
   wish.target_m = p.follow_recording ? s.ground_height_m : p.legs[static_cast<std::size_t>(leg)].height_m;
   if (!in.armed)
-    enter(s, MissionPhase::kBroken, in.now_ns);  // disarmed in flight: never armed again from here
+    end_early(s, MissionPhase::kBroken, EarlyEnd::kDisarmed, in.now_ns);  // never armed again from here
   else if (in.stop_requested)
-    enter(s, p.follow_recording ? MissionPhase::kDisarm : MissionPhase::kLand, in.now_ns);
+    end_early(s, p.follow_recording ? MissionPhase::kDisarm : MissionPhase::kLand, EarlyEnd::kStopped, in.now_ns);
   else if (in_phase_s >= length_s && !last)
     enter(s, leg_phase(leg + 1), in.now_ns);
   else if (in_phase_s >= length_s)
@@ -84,14 +89,14 @@ MissionWish mission_step(const MissionParams& p, const MissionInput& in, Mission
       else if (standing_long_enough(in, s))
         enter(s, MissionPhase::kDisarm, in.now_ns);
       else if (in_phase_s > kLongestLanding_s)
-        enter(s, MissionPhase::kBroken, in.now_ns);
+        end_early(s, MissionPhase::kBroken, EarlyEnd::kNoGround, in.now_ns);
       return wish;
     case MissionPhase::kDisarm:
       wish.disarm = true;
       if (!in.armed)
         enter(s, MissionPhase::kDone, in.now_ns);
       else if (in_phase_s > kLongestDisarm_s)
-        enter(s, MissionPhase::kBroken, in.now_ns);
+        end_early(s, MissionPhase::kBroken, EarlyEnd::kNotDisarming, in.now_ns);
       return wish;
     case MissionPhase::kDone:
     case MissionPhase::kBroken:
@@ -118,6 +123,18 @@ const char* name_of(MissionPhase phase) noexcept {
     default:
       return "hover";
   }
+}
+
+const char* name_of(EarlyEnd end) noexcept {
+  constexpr std::array kNames = {"none",
+                                 "stop requested",
+                                 "found armed, not adopted: it may be in the air; disarm it and start again",
+                                 "the ground was not seen or the autopilot did not arm in time",
+                                 "disarmed in flight",
+                                 "no ground found while landing",
+                                 "the autopilot did not disarm"};
+  const auto i = static_cast<std::size_t>(end);
+  return i < kNames.size() ? kNames[i] : "unknown";
 }
 
 }  // namespace wasp::control

@@ -41,11 +41,23 @@ struct MissionInput {
   bool heard = true;  ///< the autopilot has said whether it is armed
 };
 
+/// Why a mission ended before its end.
+enum class EarlyEnd : std::uint8_t {
+  kNone = 0,
+  kStopped,       ///< asked to: lands or disarms in order
+  kFoundArmed,    ///< armed by somebody else when wasp began: never adopted
+  kNoPatience,    ///< no ground in sight, or no arming, in time
+  kDisarmed,      ///< disarmed in flight
+  kNoGround,      ///< the landing took too long
+  kNotDisarming,  ///< the autopilot did not disarm
+};
+
 struct MissionState {
   MissionPhase phase = MissionPhase::kWait;
   TimeNs since_ns = kNever;          ///< entry into the phase
   TimeNs settled_since_ns = kNever;  ///< on the ground since
   float ground_height_m = 0;         ///< camera height while standing
+  EarlyEnd early_end = EarlyEnd::kNone;
 };
 
 /// What the mission wants at this tick.
@@ -65,5 +77,6 @@ constexpr int leg_of(MissionPhase phase) WASP_REALTIME {
   return i >= 0 && i < MissionParams::kMaxLegs ? i : -1;
 }
 const char* name_of(MissionPhase phase) WASP_REALTIME;
+const char* name_of(EarlyEnd end) WASP_REALTIME;
 
 }  // namespace wasp::control

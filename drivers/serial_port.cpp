@@ -144,7 +144,10 @@ bool SerialPort::try_reopen() noexcept {
 IoResult SerialPort::write(std::span<const std::uint8_t> bytes) WASP_REALTIME {
   if (bytes.empty()) return {IoStatus::kOk, 0};
   const ssize_t n = ::write(fd_, bytes.data(), bytes.size());
-  if (n > 0) return {IoStatus::kOk, static_cast<std::size_t>(n)};
+  if (n > 0) {
+    written_total_.fetch_add(static_cast<std::uint64_t>(n), std::memory_order_relaxed);
+    return {IoStatus::kOk, static_cast<std::size_t>(n)};
+  }
   return {n == 0 ? IoStatus::kWouldBlock : status_of_errno(), 0};
 }
 
@@ -169,6 +172,8 @@ bool SerialPort::wait_readable(TimeNs deadline_ns) WASP_REALTIME {
   }
   return false;
 }
+
+bool SerialPort::discard_output() WASP_REALTIME { return ioctl(fd_, TCFLSH, TCOFLUSH) == 0; }
 
 long SerialPort::pending_output_bytes() const WASP_REALTIME {
   int pending = 0;

@@ -3,6 +3,7 @@
 // reopens gets kGone, never somebody else's file.
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -51,6 +52,12 @@ class SerialPort {
   bool wait_readable(TimeNs deadline_ns) WASP_REALTIME;
   /// Bytes the kernel has not sent yet; -1 when the driver does not say. Realtime-safe: yes (one ioctl).
   [[nodiscard]] long pending_output_bytes() const WASP_REALTIME;
+  /// Throws away what the kernel has not sent yet; false when the driver refuses. Realtime-safe: yes (one ioctl).
+  bool discard_output() WASP_REALTIME;
+  /// Bytes written since construction, by all threads. Realtime-safe: yes.
+  [[nodiscard]] std::uint64_t written_total() const WASP_REALTIME {
+    return written_total_.load(std::memory_order_relaxed);
+  }
 
   /// Lets the device go, so that it can come back under the same name, and looks for it once. False while it is absent
   /// or refused; `last_error` says why. One thread only. Realtime-safe: no (open).
@@ -69,6 +76,7 @@ class SerialPort {
   int nothing_fd_ = -1;  ///< refuses reads and writes; stands in while the device is away
   int fd_ = -1;
   int last_error_ = 0;
+  std::atomic<std::uint64_t> written_total_{0};
 };
 
 }  // namespace wasp::drivers

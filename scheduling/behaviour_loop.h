@@ -18,7 +18,9 @@ struct BehaviourWiring {
   const shm::Region* flight = nullptr;
   std::uint32_t index = 0;  ///< Cue::behaviour
   DurationNs budget_ns = 0;
+  bool frames_in_order = false;  ///< every frame in turn while the ring holds it; else the newest
   StageTable* stages = nullptr;
+  ThreadWatch* watch = nullptr;             ///< required
   const BehaviourScript* script = nullptr;  ///< replay of a wasp recording: inputs as recorded, frames in order
   std::uint32_t script_ends_at = 0;         ///< first frame sequence of the recording's second lap
   bool attitude_from_link = true;           ///< false in a replay: the simulated vehicle's attitude is not the camera's
@@ -39,9 +41,9 @@ class BehaviourLoop {
 
   /// Runs until the stop flag. Real-time loop.
   void run(LoopControl& control) {
-    RealtimeLoop loop(control);
-    const bool in_order = wiring_.frames_done != nullptr;
-    if (in_order) frames_.from_the_start();
+    RealtimeLoop loop(control, *wiring_.watch);
+    const bool in_order = wiring_.frames_in_order || wiring_.frames_done != nullptr;
+    if (wiring_.frames_done != nullptr) frames_.from_the_start();
     while (loop.tick()) cycle(control, in_order);
   }
 
@@ -56,10 +58,14 @@ class BehaviourLoop {
   void serve(const Frame& frame) WASP_REALTIME {
     Cue cue;
     cue.started_at_ns = rt::now();
+    wiring_.watch->trace.record(cue.started_at_ns, rt::TraceKind::kFrame, frame.header.sequence,
+                                cue.started_at_ns - frame.sample.published_at_ns);
     BehaviourInput input;
     if (gather(frame, input)) {
+      wiring_.watch->busy_since_ns.store(cue.started_at_ns, std::memory_order_relaxed);
       cue.body = B::step(params_, input, state_);
       cue.finished_at_ns = rt::now();
+      wiring_.watch->busy_since_ns.store(0, std::memory_order_relaxed);
       if (frames_.intact(frame)) publish(frame, input, cue);
     }
     if (wiring_.frames_done != nullptr) wiring_.frames_done->store(frame.sample.number, std::memory_order_release);
@@ -97,6 +103,25 @@ class BehaviourLoop {
     wake_->record(cue.started_at_ns - cue.released_at_ns);
     compute_->record(compute_ns);
     cues_.write(cue, rt::now());
+    hold_against_budget(cue, compute_ns);
+  }
+
+  void hold_against_budget(const Cue& cue, DurationNs compute_ns) WASP_REALTIME {
+    ThreadWatch& watch = *wiring_.watch;
+    watch.trace.record(cue.finished_at_ns, rt::TraceKind::kCue, cue.frame_sequence, compute_ns);
+    const rt::ThreadUsage usage = watch.take_usage();
+    if (cue.over_budget == 0) return watch.overruns_in_row.store(0, std::memory_order_relaxed);
+    watch.overruns_in_row.fetch_add(1, std::memory_order_relaxed);
+    Miss miss;
+    miss.kind = MissKind::kOverBudget;
+    miss.number = cue.frame_sequence;
+    miss.due_at_ns = cue.released_at_ns;
+    miss.released_at_ns = cue.started_at_ns;
+    miss.computed_at_ns = cue.finished_at_ns;
+    miss.late_ns = compute_ns;
+    miss.limit_ns = wiring_.budget_ns;
+    miss.usage = usage;
+    watch.report(miss);
   }
 
   typename B::Params params_;

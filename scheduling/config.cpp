@@ -1,6 +1,8 @@
 #include "scheduling/config.h"
 
-#include <algorithm>
+#include <sstream>
+
+#include "scheduling/default_config.h"
 
 namespace wasp::scheduling {
 namespace {
@@ -17,6 +19,15 @@ void read_microseconds(TomlTable& t, const char* key, DurationNs& out) {
   out = static_cast<DurationNs>(us * kMicrosecond);
 }
 
+/// `value` as one of `names`, which are in the order of the enumeration.
+template <class Enum>
+void read_choice(TomlTable& t, const char* key, Enum& value, const std::vector<std::string>& names) {
+  std::string name = names[static_cast<std::size_t>(value)];
+  t.text_value(key, name, names);
+  for (std::size_t i = 0; i < names.size(); ++i)
+    if (names[i] == name) value = static_cast<Enum>(i);
+}
+
 void read_thread(TomlTable& t, ThreadRow& row) {
   t.number("core", row.core, -1, 1023);
   t.number("priority", row.priority, 1, 99);
@@ -27,6 +38,13 @@ void read_run(TomlTable t, Config& c) {
   t.flag("enforce_real_time", c.enforce_real_time);
   t.flag("strict_syscalls", c.strict_syscalls);
   t.number("heap_mib", c.heap_mib, 1, 4096);
+  read_choice(t, "admission", c.admission, {"enforce", "warn", "off"});
+  read_microseconds(t, "blocking_us", c.blocking_ns);
+  t.number("demote_after", c.demote_after, 0, 1'000'000);
+  t.number("incidents", c.incidents, 0, 1000);
+  t.text_value("incident_dir", c.incident_dir);
+  t.flag("trace_switches", c.trace_switches);
+  t.text_value("tracefs", c.tracefs);
   t.finish();
 }
 
@@ -44,6 +62,7 @@ void read_camera(TomlTable t, Config& c) {
   Intrinsics& k = c.camera.intrinsics;
   t.number("width_px", k.width_px, 16, 8192);
   t.number("height_px", k.height_px, 16, 8192);
+  t.number("rate_hz", c.camera_rate_hz, 1, 1000);
   t.number("fx_px", k.fx_px, 1, 1e5);
   t.number("fy_px", k.fy_px, 1, 1e5);
   t.number("cx_px", k.cx_px, -1e4, 1e5);
@@ -100,11 +119,12 @@ void read_control(TomlTable t, Config& c) {
     throw ConfigError("control: the vehicle is too heavy for its thrust");
 }
 
-void read_behaviours(TomlTable t, Config& c) {
+void read_behaviours(TomlTable t, Config& c, bool foreign_behaviours) {
   for (std::size_t i = 0; i < c.behaviours.size(); ++i) {
     TomlTable b = t.table(c.behaviours[i].name.c_str());
     control::ArbiterRow& row = c.control.arbiter.rows[i];
     read_thread(b, c.behaviours[i]);
+    read_choice(b, "frames", c.behaviours[i].frames_in_order, {"newest", "in_order"});
     read_milliseconds(b, "age_limit_ms", row.age_limit_ns);
     b.number("height_rank", row.height_rank, -1, 15);
     b.number("heading_weight", row.heading_weight, 0, 100);
@@ -112,24 +132,31 @@ void read_behaviours(TomlTable t, Config& c) {
     c.behaviour_params[i].merge(b.table("params"));
     b.finish();
   }
-  t.finish();
+  if (!foreign_behaviours) t.finish();
 }
 
-void read_file(const std::string& path, Config& c) {
-  TomlTable root = TomlTable::parse_file(path);
+void read_threads(TomlTable threads, Config& c) {
+  for (ThreadRow* row : {&c.control_thread, &c.link_thread, &c.camera_thread}) {
+    TomlTable t = threads.table(row->name.c_str());
+    read_thread(t, *row);
+    if (row == &c.link_thread)
+      read_microseconds(t, "period_us", c.link_period_ns);  // woken by bytes: it has no releases to overrun
+    else
+      read_choice(t, "overrun", row->overrun, {"skip", "catch_up", "stop"});
+    t.finish();
+  }
+  threads.finish();
+}
+
+/// `foreign_behaviours`: sections of behaviours this program does not have are passed over.
+void read_document(TomlTable root, Config& c, bool foreign_behaviours) {
   read_run(root.table("run"), c);
   read_autopilot(root.table("autopilot"), c);
   read_camera(root.table("camera"), c);
   read_mission(root.table("mission"), c.control.mission);
   read_control(root.table("control"), c);
-  TomlTable threads = root.table("threads");
-  for (ThreadRow* row : {&c.control_thread, &c.link_thread, &c.camera_thread}) {
-    TomlTable t = threads.table(row->name.c_str());
-    read_thread(t, *row);
-    t.finish();
-  }
-  threads.finish();
-  read_behaviours(root.table("behaviour"), c);
+  read_threads(root.table("threads"), c);
+  read_behaviours(root.table("behaviour"), c, foreign_behaviours);
   root.finish();
 }
 
@@ -141,11 +168,9 @@ Config load_config(const std::vector<std::string>& paths, const std::vector<std:
   for (const auto& name : behaviour_names) config.behaviours.push_back({name, 1, 50, 4 * kMillisecond});
   config.behaviour_params.assign(behaviour_names.size(), TomlTable(toml::table{}));
   config.control.arbiter.behaviour_count = static_cast<int>(behaviour_names.size());
-  for (const auto& path : paths) read_file(path, config);
-  if (config.control.mission.leg_count == 0) {
-    config.control.mission.leg_count = 2;
-    config.control.mission.legs = {control::HoverLeg{0.5f, 40.f}, control::HoverLeg{1.0f, 40.f}};
-  }
+  std::istringstream defaults(kDefaultConfig);
+  read_document(TomlTable::parse(defaults, "built-in config/wasp.toml"), config, true);
+  for (const auto& path : paths) read_document(TomlTable::parse_file(path), config, false);
   return config;
 }
 

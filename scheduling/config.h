@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "control/control_step.h"
+#include "rt/periodic.h"
 #include "rt/thread.h"
 #include "scheduling/toml_table.h"
 #include "types/camera.h"
@@ -17,12 +18,24 @@ struct ThreadRow {
   int core = 1;
   int priority = 50;
   DurationNs budget_ns = 4 * kMillisecond;
+  rt::OverrunPolicy overrun = rt::OverrunPolicy::kSkip;  ///< periodic threads: control, camera
+  bool frames_in_order = false;                          ///< behaviours: every frame in turn, not the newest
 };
+
+/// What the admission test does with a thread table that cannot keep its deadlines.
+enum class AdmissionMode : std::uint8_t { kEnforce, kWarn, kOff };
 
 struct Config {
   bool enforce_real_time = true;
   bool strict_syscalls = false;
   int heap_mib = 64;
+  AdmissionMode admission = AdmissionMode::kEnforce;
+  DurationNs blocking_ns = 200 * kMicrosecond;  ///< longest the kernel keeps a ready real-time thread waiting
+  int demote_after = 10;                        ///< steps over budget in a row; 0: never
+  int incidents = 8;                            ///< most incident files of one flight
+  std::string incident_dir = "incidents";
+  std::string tracefs;  ///< where tracefs is mounted; empty: the usual places
+  bool trace_switches = true;
 
   std::string endpoint = "serial:/dev/ttyUSB0:921600";
   std::string flavour = "wasp";
@@ -32,6 +45,7 @@ struct Config {
   std::string camera_driver = "sim";
   CameraGeometry camera;
   double camera_pitch_down_deg = 30.0;
+  double camera_rate_hz = 30.0;  ///< what admission takes as the period of the behaviours
 
   DurationNs control_period_ns = 50 * kMillisecond;
   DurationNs control_deadline_ns = 10 * kMillisecond;
@@ -39,13 +53,15 @@ struct Config {
 
   ThreadRow control_thread{"control", 1, 80, 2 * kMillisecond};
   ThreadRow link_thread{"link", 1, 70, 1 * kMillisecond};
-  ThreadRow camera_thread{"camera", 1, 60, 5 * kMillisecond};
+  DurationNs link_period_ns = 5 * kMillisecond;  ///< least time between wake-ups that admission counts
+  ThreadRow camera_thread{"camera", 1, 60, 5 * kMillisecond, rt::OverrunPolicy::kCatchUp};
   std::vector<ThreadRow> behaviours;        ///< index = Cue::behaviour
   std::vector<TomlTable> behaviour_params;  ///< [behaviour.NAME.params], checked by the behaviour's own list
 };
 
-/// Reads `paths` in order, later ones override single keys. `behaviour_names` are the behaviours this program has, in
-/// order; a section for any other is an error. Throws ConfigError naming file, line and value.
+/// The defaults, which are config/wasp.toml itself (built in), then `paths` in order; later ones override single keys.
+/// `behaviour_names` are the behaviours this program has, in order; a section for any other is an error. Throws
+/// ConfigError naming file, line and value.
 Config load_config(const std::vector<std::string>& paths, const std::vector<std::string>& behaviour_names);
 
 }  // namespace wasp::scheduling

@@ -23,7 +23,8 @@ ControlLoop::ControlLoop(const Config& config, const ControlWiring& wiring)
       wake_(wiring.stages->add("control", "wake-up", 0)),
       compute_(wiring.stages->add("control", "compute", config.control_thread.budget_ns)),
       write_(wiring.stages->add("control", "write", 0)),
-      tick_to_byte_(wiring.stages->add("control", "tick to byte", config.control_deadline_ns)) {
+      tick_to_byte_(wiring.stages->add("control", "tick to byte", config.control_deadline_ns)),
+      line_(*wiring.port) {
   last_exposed_.fill(kNever);
   for (std::size_t i = 0; i < config.behaviours.size(); ++i) {
     const std::string& name = config.behaviours[i].name;
@@ -34,43 +35,66 @@ ControlLoop::ControlLoop(const Config& config, const ControlWiring& wiring)
 }
 
 void ControlLoop::run(LoopControl& control) {
-  RealtimeLoop loop(control);
-  rt::PeriodicGrid grid(rt::now() + config_.control_period_ns, config_.control_period_ns);
+  RealtimeLoop loop(control, *wiring_.watch);
+  rt::PeriodicGrid grid(rt::now() + config_.control_period_ns, config_.control_period_ns,
+                        config_.control_thread.overrun);
   while (loop.tick() && !mission_over_.load(std::memory_order_relaxed)) tick(rt::wait_next(grid), control);
 }
 
 void ControlLoop::tick(const rt::Release& release, LoopControl& control) WASP_REALTIME {
+  this->release(release, control);
   control::ControlInput input;
   input.now_ns = release.released_at_ns;
   input.dt_s = static_cast<float>(to_seconds(config_.control_period_ns * static_cast<DurationNs>(1 + release.skipped)));
   input.stop_requested = control.stop_requested.load(std::memory_order_relaxed);
-  consecutive_misses_ += static_cast<int>(release.skipped);
   input.deadlines_missed = consecutive_misses_ >= kMissesBeforeHold;
   gather(input);
-  const control::ControlOutput output = control::control_step(config_.control, input, state_);
-  Command command = output.command;
+  control::ControlOutput output = control::control_step(config_.control, input, state_);
+  Command& command = output.command;
   command.due_at_ns = release.due_at_ns;
   command.released_at_ns = release.released_at_ns;
   command.tick = release.index;
   command.computed_at_ns = rt::now();
-  send(output, command, command.computed_at_ns);
-  RunStatus& status = *control.status;
-  status.ticks.fetch_add(1, std::memory_order_relaxed);
-  status.skipped.fetch_add(release.skipped, std::memory_order_relaxed);
-  account(input, command, control);
+  send(input, output, control);
+  account(input, command, release.skipped, control);
   commands_.write(command, rt::now());
   announce(command);
+  end_of_tick(input, control);
+}
+
+/// What a release itself says: how late, and whether others were passed over.
+void ControlLoop::release(const rt::Release& release, LoopControl& control) WASP_REALTIME {
+  wiring_.watch->trace.record(release.released_at_ns, rt::TraceKind::kRelease, release.index,
+                              release.released_at_ns - release.due_at_ns);
+  consecutive_misses_ += static_cast<int>(release.skipped);
+  control.status->ticks.fetch_add(1, std::memory_order_relaxed);
+  control.status->skipped.fetch_add(release.skipped, std::memory_order_relaxed);
+  if (release.skipped == 0 || config_.control_thread.overrun != rt::OverrunPolicy::kStop) return;
+  if (control.overrun_stop.exchange(true)) return;
+  control.stop_requested.store(true);
+  wiring_.events->say(release.released_at_ns, "overrun of control, policy stop: landing in order; releases skipped: ",
+                      static_cast<long>(release.skipped));
+}
+
+void ControlLoop::end_of_tick(const control::ControlInput& input, LoopControl& control) WASP_REALTIME {
+  RunStatus& status = *control.status;
   const auto phase = state_.mission.phase;
   if (control::leg_of(phase) >= 0) control.flying.store(true, std::memory_order_relaxed);
   if (phase == control::MissionPhase::kDone || phase == control::MissionPhase::kBroken) {
-    status.mission_result.store(phase == control::MissionPhase::kDone ? 1 : 2, std::memory_order_relaxed);
+    const MissionResult result = phase == control::MissionPhase::kBroken                ? MissionResult::kBrokenOff
+                                 : state_.mission.early_end == control::EarlyEnd::kNone ? MissionResult::kFlown
+                                                                                        : MissionResult::kStoppedEarly;
+    status.mission_result.store(static_cast<std::uint32_t>(result), std::memory_order_relaxed);
     mission_over_.store(true);
   }
   status.armed.store(input.autopilot.armed ? 1 : 0, std::memory_order_relaxed);
 }
 
 void ControlLoop::gather(control::ControlInput& input) WASP_REALTIME {
-  for (std::size_t i = 0; i < cues_.size(); ++i) input.cues.present[i] = cues_[i].copy_newest(input.cues.cues[i]);
+  for (std::size_t i = 0; i < cues_.size(); ++i) {
+    input.cues.present[i] = cues_[i].copy_newest(input.cues.cues[i]);
+    input.cues.overdue[i] = i < wiring_.behaviour_watches.size() && wiring_.behaviour_watches[i]->overdue(input.now_ns);
+  }
   input.attitude_present = attitude_.copy_newest(input.attitude);
   mean_acceleration(input);
   LinkReport report;
@@ -92,16 +116,40 @@ void ControlLoop::mean_acceleration(control::ControlInput& input) WASP_REALTIME 
   for (std::size_t k = 0; n > 0 && k < 3; ++k) input.accel_body_mps2[k] = sum[k] / static_cast<float>(n);
 }
 
-void ControlLoop::send(const control::ControlOutput& output, Command& command, TimeNs now_ns) WASP_REALTIME {
-  std::size_t used = 0;
-  if (command.sent != 0)
-    used = wiring_.autopilot->encode_attitude_target({command.q_ned_body, true, command.yaw_rate_radps, command.thrust},
-                                                     now_ns, out_);
+std::size_t ControlLoop::encode(const Command& command, TimeNs now_ns) WASP_REALTIME {
+  if (command.sent == 0) return 0;
+  return wiring_.autopilot->encode_attitude_target({command.q_ned_body, true, command.yaw_rate_radps, command.thrust},
+                                                   now_ns, out_);
+}
+
+/// The last look at the clock: what has grown too old since the arbiter looked is replaced. Returns the bytes used.
+std::size_t ControlLoop::refuse_if_too_old(const control::ControlInput& input, control::ControlOutput& output,
+                                           std::size_t used, LoopControl& control) WASP_REALTIME {
+  const TimeNs now_ns = rt::now();
+  const control::Refusal refusal = control::refusal_at(output, now_ns);
+  if (output.command.sent == 0 || refusal == control::Refusal::kNone) return used;
+  control::refuse(config_.control, input, refusal, state_, output);
+  control.status->commands_refused.fetch_add(1, std::memory_order_relaxed);
+  wiring_.events->say(now_ns,
+                      refusal == control::Refusal::kCueTooOld
+                          ? "command refused: its cue grew too old before the write; tick "
+                          : "command refused: its attitude grew too old before the write; tick ",
+                      static_cast<long>(output.command.tick));
+  return encode(output.command, now_ns);
+}
+
+void ControlLoop::send(const control::ControlInput& input, control::ControlOutput& output,
+                       LoopControl& control) WASP_REALTIME {
+  Command& command = output.command;
+  std::size_t used = encode(command, command.computed_at_ns);
+  if (wiring_.hook.before_write != nullptr) wiring_.hook.before_write(wiring_.hook.context, command.tick);
+  used = refuse_if_too_old(input, output, used, control);
   const std::size_t setpoint_bytes = used;
-  used = append_requests(output, used, now_ns);
+  used = append_requests(output, used, command.computed_at_ns);
   if (used == 0) return;
-  const drivers::IoResult written = wiring_.port->write(std::span<const std::uint8_t>(out_.data(), used));
-  if (command.sent != 0 && written.bytes >= setpoint_bytes) command.written_at_ns = rt::now();
+  const SetpointLine::Sent sent = line_.send(std::span<const std::uint8_t>(out_.data(), used), setpoint_bytes);
+  if (sent.flushed) control.status->setpoints_flushed.fetch_add(1, std::memory_order_relaxed);
+  if (command.sent != 0 && sent.setpoint_whole) command.written_at_ns = rt::now();
 }
 
 /// Heartbeat, TIMESYNC request, arming: behind the setpoint in the same write. Returns the bytes used.
@@ -121,7 +169,9 @@ std::size_t ControlLoop::append_requests(const control::ControlOutput& output, s
   return used;
 }
 
-void ControlLoop::account(const control::ControlInput& input, Command& command, LoopControl& control) WASP_REALTIME {
+void ControlLoop::account(const control::ControlInput& input, const Command& command, std::uint64_t skipped,
+                          LoopControl& control) WASP_REALTIME {
+  RunStatus& status = *control.status;
   wake_->record(command.released_at_ns - command.due_at_ns);
   compute_->record(command.computed_at_ns - command.released_at_ns);
   const bool written = command.written_at_ns != 0;
@@ -132,15 +182,59 @@ void ControlLoop::account(const control::ControlInput& input, Command& command, 
   const bool missed =
       command.sent != 0 && (!written || command.written_at_ns - command.due_at_ns > config_.control_deadline_ns);
   consecutive_misses_ = missed ? consecutive_misses_ + 1 : 0;
-  if (missed) control.status->deadline_misses.fetch_add(1, std::memory_order_relaxed);
+  if (missed) status.deadline_misses.fetch_add(1, std::memory_order_relaxed);
+  if (command.sent != 0 && command.mode == FlightMode::kBehaviour)
+    status.behaviour_ticks.fetch_add(1, std::memory_order_relaxed);
+  account_cues(input, command, status);
+  report_miss(command, skipped, missed);
+}
+
+void ControlLoop::account_cues(const control::ControlInput& input, const Command& command,
+                               RunStatus& status) WASP_REALTIME {
   for (std::size_t i = 0; i < cues_.size(); ++i) {
     const Cue& cue = input.cues.cues[i];
+    const bool demoted = i < wiring_.behaviour_watches.size() && wiring_.behaviour_watches[i]->demoted.load() != 0;
+    const bool late = input.cues.overdue[i] || (input.cues.present[i] && cue.over_budget != 0);
+    const auto state = demoted ? BehaviourState::kDemoted
+                       : late  ? BehaviourState::kOverBudget
+                               : BehaviourState::kPunctual;
+    if (i < status.behaviour_state.size())
+      status.behaviour_state[i].store(static_cast<std::uint32_t>(state), std::memory_order_relaxed);
     if (!input.cues.present[i]) continue;
     behaviour_stages_[i].age->record(input.now_ns - cue.exposed_at_ns);
-    if (!written || cue.exposed_at_ns == last_exposed_[i]) continue;
+    if (command.written_at_ns == 0 || cue.exposed_at_ns == last_exposed_[i]) continue;
     behaviour_stages_[i].end_to_end->record(command.written_at_ns - cue.exposed_at_ns);
     last_exposed_[i] = cue.exposed_at_ns;
   }
+}
+
+/// Tells the supervisor of a tick that missed anything.
+void ControlLoop::report_miss(const Command& command, std::uint64_t skipped, bool missed) WASP_REALTIME {
+  ThreadWatch& watch = *wiring_.watch;
+  const bool written = command.written_at_ns != 0;
+  watch.trace.record(command.computed_at_ns, rt::TraceKind::kComputed, command.tick,
+                     command.computed_at_ns - command.released_at_ns);
+  if (written)
+    watch.trace.record(command.written_at_ns, rt::TraceKind::kWritten, command.tick,
+                       command.written_at_ns - command.due_at_ns);
+  const rt::ThreadUsage usage = watch.take_usage();
+  if (!missed && skipped == 0 && command.refused == 0) return;
+  Miss miss;
+  miss.kind = skipped > 0            ? MissKind::kSkipped
+              : command.refused != 0 ? MissKind::kRefused
+              : written              ? MissKind::kLate
+                                     : MissKind::kNotWritten;
+  miss.number = command.tick;
+  miss.due_at_ns = command.due_at_ns;
+  miss.released_at_ns = command.released_at_ns;
+  miss.computed_at_ns = command.computed_at_ns;
+  miss.written_at_ns = command.written_at_ns;
+  miss.late_ns = (written ? command.written_at_ns : command.computed_at_ns) - command.due_at_ns;
+  if (skipped > 0) miss.late_ns += static_cast<DurationNs>(skipped) * config_.control_period_ns;
+  miss.limit_ns = config_.control_deadline_ns;
+  miss.skipped = skipped;
+  miss.usage = usage;
+  watch.report(miss);
 }
 
 void ControlLoop::announce(const Command& command) WASP_REALTIME {
@@ -151,6 +245,9 @@ void ControlLoop::announce(const Command& command) WASP_REALTIME {
   if (command.mission_phase != announced_phase_)
     wiring_.events->say(command.released_at_ns,
                         "mission: ", control::name_of(static_cast<control::MissionPhase>(command.mission_phase)));
+  if (state_.mission.early_end != announced_end_)
+    wiring_.events->say(command.released_at_ns, "mission ends early: ", control::name_of(state_.mission.early_end));
+  announced_end_ = state_.mission.early_end;
   announced_mode_ = command.mode;
   announced_phase_ = command.mission_phase;
 }

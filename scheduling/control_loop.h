@@ -14,6 +14,7 @@
 #include "scheduling/config.h"
 #include "scheduling/events.h"
 #include "scheduling/realtime_loop.h"
+#include "scheduling/setpoint_line.h"
 #include "shm/broadcast_ring.h"
 
 namespace wasp::scheduling {
@@ -25,6 +26,12 @@ struct LinkReport {
   std::uint32_t custom_mode = 0;
 };
 
+/// A stall for tests, in the middle of a tick: between what the arbiter said and the write. Null in flight.
+struct ControlHook {
+  void (*before_write)(void* context, std::uint64_t tick) WASP_REALTIME = nullptr;
+  void* context = nullptr;
+};
+
 struct ControlWiring {
   const shm::Region* flight = nullptr;
   StageTable* stages = nullptr;
@@ -32,6 +39,9 @@ struct ControlWiring {
   drivers::SerialPort* port = nullptr;
   drivers::AutopilotLink* autopilot = nullptr;
   EventQueue* events = nullptr;
+  ThreadWatch* watch = nullptr;                            ///< required
+  std::vector<const ThreadWatch*> behaviour_watches = {};  ///< by Cue::behaviour; may be empty
+  ControlHook hook = {};
 };
 
 class ControlLoop {
@@ -49,9 +59,17 @@ class ControlLoop {
   void tick(const rt::Release& release, LoopControl& control) WASP_REALTIME;
   void gather(control::ControlInput& input) WASP_REALTIME;
   void mean_acceleration(control::ControlInput& input) WASP_REALTIME;
-  void send(const control::ControlOutput& output, Command& command, TimeNs now_ns) WASP_REALTIME;
+  void release(const rt::Release& release, LoopControl& control) WASP_REALTIME;
+  std::size_t encode(const Command& command, TimeNs now_ns) WASP_REALTIME;
+  std::size_t refuse_if_too_old(const control::ControlInput& input, control::ControlOutput& output, std::size_t used,
+                                LoopControl& control) WASP_REALTIME;
+  void send(const control::ControlInput& input, control::ControlOutput& output, LoopControl& control) WASP_REALTIME;
   std::size_t append_requests(const control::ControlOutput& output, std::size_t used, TimeNs now_ns) WASP_REALTIME;
-  void account(const control::ControlInput& input, Command& command, LoopControl& control) WASP_REALTIME;
+  void account(const control::ControlInput& input, const Command& command, std::uint64_t skipped,
+               LoopControl& control) WASP_REALTIME;
+  void account_cues(const control::ControlInput& input, const Command& command, RunStatus& status) WASP_REALTIME;
+  void report_miss(const Command& command, std::uint64_t skipped, bool missed) WASP_REALTIME;
+  void end_of_tick(const control::ControlInput& input, LoopControl& control) WASP_REALTIME;
   void announce(const Command& command) WASP_REALTIME;
 
   Config config_;
@@ -62,12 +80,14 @@ class ControlLoop {
   shm::RingWriter commands_;
   std::vector<BehaviourStages> behaviour_stages_;
   Stage *wake_, *compute_, *write_, *tick_to_byte_;
+  SetpointLine line_;
   std::array<std::uint8_t, 1024> out_{};
   std::array<TimeNs, control::kMaxBehaviours> last_exposed_{};
   TimeNs heartbeat_due_ns_ = 0, request_due_ns_ = 0;
   int consecutive_misses_ = 0;
   FlightMode announced_mode_ = FlightMode::kDisarmed;
   std::uint8_t announced_phase_ = 255;
+  control::EarlyEnd announced_end_ = control::EarlyEnd::kNone;
   std::atomic<bool> mission_over_{false};
 };
 

@@ -13,7 +13,7 @@ namespace wasp::scheduling {
 
 struct Event {
   TimeNs at_ns = 0;
-  std::array<char, 88> text{};
+  std::array<char, 120> text{};
 };
 
 /// One producer (a real-time thread), one consumer (the main thread). A full queue drops the event and counts it.

@@ -2,7 +2,6 @@
 
 #include <signal.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
 #include <memory>
@@ -11,28 +10,22 @@
 #include "rt/clock.h"
 #include "rt/process.h"
 #include "rt/thread.h"
+#include "scheduling/arming.h"
 #include "scheduling/control_loop.h"
+#include "scheduling/flight_options.h"
 #include "scheduling/flight_regions.h"
 #include "scheduling/link_loop.h"
 #include "scheduling/replay_camera.h"
+#include "scheduling/supervisor.h"
 #include "shm/topics.h"
 
 namespace wasp::scheduling {
 namespace {
 
 constexpr double kReplayTail_s = 0.3;  // the last frames' cues reach a command before the replay ends
+constexpr int kEndedShort = 4;         // exit code: in order, but short of its purpose
 
-struct Options {
-  std::string instance = "wasp";
-  std::vector<std::string> configs;
-  std::string replay;
-  double seconds = 0;
-  bool no_rt = false;
-  bool check_rights = false;
-};
-
-void log(const char* text) { std::fprintf(stderr, "%10.3f  %s\n", to_seconds(rt::now()), text); }
-void log(const std::string& text) { log(text.c_str()); }
+void log(const std::string& text) { std::fprintf(stderr, "%10.3f  %s\n", to_seconds(rt::now()), text.c_str()); }
 
 /// Blocks the signals that end a flight, for every thread made from here on; the main thread takes them in turn.
 sigset_t block_signals() {
@@ -42,12 +35,6 @@ sigset_t block_signals() {
   pthread_sigmask(SIG_BLOCK, &set, nullptr);
   signal(SIGPIPE, SIG_IGN);
   return set;
-}
-
-std::vector<std::string> names_of(const BehaviourTable& table) {
-  std::vector<std::string> names;
-  for (const auto& row : table) names.push_back(row.name);
-  return names;
 }
 
 drivers::LinkIdentity identity_of(const Config& config) {
@@ -69,7 +56,7 @@ struct RegionFiles {
 /// Everything one flight owns, in order of construction; destroyed in reverse, threads first.
 class Flight {
  public:
-  Flight(const BehaviourTable& table, const Options& options, Config config)
+  Flight(const BehaviourTable& table, const FlightOptions& options, Config config)
       : table_(table),
         options_(options),
         config_(std::move(config)),
@@ -82,6 +69,7 @@ class Flight {
     control_.status = &run_status(flight_);
     control_.status->preempt_rt = rt::kernel_is_preempt_rt() ? 1 : 0;
     control_.strict_syscalls = config_.strict_syscalls;
+    frame_period_ns_ = from_seconds(1.0 / config_.camera_rate_hz);
   }
 
   ~Flight() { control_.stop = true; }  // threads that stand already end before they are joined
@@ -91,7 +79,9 @@ class Flight {
   int run(const sigset_t& signals) {
     open_camera();
     wire();
-    prepare_real_time();
+    admit(make_plan(config_, frame_period_ns_, replay_ != nullptr, measured_costs()), config_.admission, real_time_,
+          log);
+    latency_hold_ = prepare_real_time(config_, real_time_, log);
     start_threads();
     control_.realtime_started = true;
     flight_files_.keep = camera_files_.keep = true;  // the recorder drains them; the launcher removes them
@@ -112,6 +102,7 @@ class Flight {
     for (const auto& problem : recording.problems()) log("recording: " + problem);
     recording_problems_ = recording.problems().size();
     config_.camera = recording.geometry();
+    frame_period_ns_ = from_seconds(1.0 / recording.nominal_rate_hz());
     scripts_ = load_replay_script(options_.replay);
     second_lap_ = ReplayCamera::lap_sequence(recording);
     const double seconds = options_.seconds > 0 ? options_.seconds : to_seconds(ReplayCamera::lap_ns(recording));
@@ -121,7 +112,16 @@ class Flight {
     camera_ = std::make_unique<shm::Region>(
         shm::Region::create(shm::camera_region(options_.instance), ReplayCamera::topics(recording)));
     camera_files_.name = camera_->name();
-    replay_ = std::make_unique<ReplayCamera>(std::move(recording), *camera_, from_seconds(seconds), stages_);
+    replay_ = std::make_unique<ReplayCamera>(std::move(recording), *camera_, from_seconds(seconds), stages_,
+                                             add_watch(config_.camera_thread), config_.camera_thread.overrun);
+  }
+
+  ThreadWatch& add_watch(const ThreadRow& row) {
+    return board_.add({row.name, rt::nearest_usable_core(row.core), row.priority, row.budget_ns});
+  }
+
+  MeasuredCosts measured_costs() const {
+    return options_.measured.empty() ? MeasuredCosts{} : read_measured_costs(options_.measured);
   }
 
   /// A recording without depth: behaviours that see grey images may supply the height, in their order in the table.
@@ -134,6 +134,7 @@ class Flight {
   }
 
   void wire() {
+    ControlWiring control{&flight_, &stages_, &report_, &port_, &autopilot_, &control_events_};
     for (std::size_t i = 0; i < table_.size(); ++i) {
       const BehaviourRow& row = table_[i];
       BehaviourWiring w;
@@ -141,7 +142,10 @@ class Flight {
       w.flight = &flight_;
       w.index = static_cast<std::uint32_t>(i);
       w.budget_ns = config_.behaviours[i].budget_ns;
+      w.frames_in_order = config_.behaviours[i].frames_in_order;
       w.stages = &stages_;
+      w.watch = &add_watch(config_.behaviours[i]);
+      control.behaviour_watches.push_back(w.watch);
       if (replay_) {
         w.attitude_from_link = false;
         w.frames_done = replay_->add_reader(row.stream == Stream::kDepth);
@@ -152,32 +156,16 @@ class Flight {
       }
       bodies_.push_back(row.make(config_.camera, config_.behaviour_params[i], w));
     }
-    link_ = std::make_unique<LinkLoop>(flight_, port_, autopilot_, stages_, report_, link_events_);
-    control_loop_ = std::make_unique<ControlLoop>(
-        config_, ControlWiring{&flight_, &stages_, &report_, &port_, &autopilot_, &control_events_});
+    link_ = std::make_unique<LinkLoop>(flight_, port_, autopilot_, stages_, report_, link_events_,
+                                       add_watch(config_.link_thread));
+    control.watch = &add_watch(config_.control_thread);
+    control_loop_ = std::make_unique<ControlLoop>(config_, control);
+    supervisor_ = std::make_unique<Supervisor>(board_, *control_.status, supervisor_options(), log);
   }
 
-  [[nodiscard]] int highest_priority() const {
-    int highest =
-        std::max({config_.control_thread.priority, config_.link_thread.priority, config_.camera_thread.priority});
-    for (const auto& b : config_.behaviours) highest = std::max(highest, b.priority);
-    return highest;
-  }
-
-  /// Locks memory and keeps the processor awake; refuses by name where a right is missing.
-  void prepare_real_time() {
-    if (!real_time_ && config_.enforce_real_time)
-      throw std::runtime_error(
-          "refusing to arm: --no-rt was given, but the configuration says [run] enforce_real_time = true");
-    if (!real_time_) return;
-    std::string refusal;
-    for (const auto& m : rt::missing_rights(highest_priority()))
-      refusal += "\n  missing right: " + m.right + "; grant it with: " + m.remedy;
-    if (!refusal.empty()) throw std::runtime_error("refusing to arm without real time (or say --no-rt):" + refusal);
-    latency_hold_ = std::make_unique<rt::CpuLatencyHold>();
-    if (!latency_hold_->held()) log("note: /dev/cpu_dma_latency is not available; the processor may sleep deeply");
-    if (const std::string why = rt::lock_memory(static_cast<std::size_t>(config_.heap_mib) << 20); !why.empty())
-      throw std::runtime_error("refusing to arm: " + why);
+  SupervisorOptions supervisor_options() const {
+    return {options_.instance,      real_time_,     config_.demote_after, config_.incidents, config_.incident_dir,
+            config_.trace_switches, config_.tracefs};
   }
 
   rt::ThreadSpec spec(const ThreadRow& row) const {
@@ -210,41 +198,66 @@ class Flight {
 
   void supervise(const sigset_t& signals) {
     while (!control_loop_->mission_over()) {
-      const timespec patience = rt::to_timespec(100 * kMillisecond);
+      const timespec patience = rt::to_timespec(Supervisor::kPeriod);
       if (sigtimedwait(&signals, nullptr, &patience) > 0) {
         if (control_.stop_requested.exchange(true)) break;  // the second signal: stop at once
         log("stop requested: landing in order");
       }
       drain_events();
+      supervisor_->look();
     }
     control_.stop = true;
     threads_.clear();
+    supervisor_->look();
     drain_events();
+    if (const std::uint64_t lost = control_events_.dropped() + link_events_.dropped(); lost > 0)
+      log(std::to_string(lost) + " events were lost: their queue was full");
+  }
+
+  /// What the counters say that a user must hear.
+  void say_counts(const RunStatus& status) {
+    const auto say = [](std::uint64_t n, const std::string& what) {
+      if (n > 0) log(std::to_string(n) + " " + what);
+    };
+    if (replay_) {
+      say(replay_->held_back(), "times the replay held the camera back for a slow reader");
+      say(replay_->dropped(), "frames of the recording were dropped as late ([threads.camera] overrun)");
+      say(replay_->decode_errors(), "frames of the recording could not be decoded");
+    }
+    say(status.skipped, "control releases were skipped");
+    say(status.deadline_misses, "control deadlines were missed");
+    say(status.commands_refused, "commands were refused as too old at the wire");
+    say(status.setpoints_flushed, "times an old setpoint was thrown out of a stalled serial line");
+    log("page faults in real-time threads: " + std::to_string(status.minor_faults) + " minor, " +
+        std::to_string(status.major_faults) + " major");
   }
 
   int conclude() {
     RunStatus& status = *control_.status;
-    if (replay_ && replay_->held_back() > 0)
-      log("replay: the camera was held back " + std::to_string(replay_->held_back()) + " times for a slow reader");
-    if (replay_ && replay_->decode_errors() > 0)
-      log("replay: " + std::to_string(replay_->decode_errors()) + " frames could not be decoded");
-    log("page faults in real-time threads: " + std::to_string(status.minor_faults) + " minor, " +
-        std::to_string(status.major_faults) + " major");
-    const bool flown = status.mission_result.load() == 1;
-    log(flown ? "mission flown to its end" : "mission broken off");
+    say_counts(status);
+    const auto result = static_cast<MissionResult>(status.mission_result.load());
+    const bool idle = result == MissionResult::kFlown && status.behaviour_ticks == 0;
+    log(result == MissionResult::kStoppedEarly ? "mission stopped early, in order"
+        : result != MissionResult::kFlown      ? "mission broken off"
+        : idle                                 ? "mission flown to its end, but no behaviour ever commanded"
+                                               : "mission flown to its end");
+    if (control_.overrun_stop) log("stopped because a thread overran ([threads] overrun = \"stop\")");
     status.finished = 1;
     const bool damaged = replay_ && (replay_->decode_errors() > 0 || recording_problems_ > 0);
     if (damaged) log("the recording is damaged: see above");
-    return flown && !damaged ? 0 : 1;
+    if (damaged || (result != MissionResult::kFlown && result != MissionResult::kStoppedEarly)) return 1;
+    return idle || result == MissionResult::kStoppedEarly ? kEndedShort : 0;
   }
 
   const BehaviourTable& table_;
-  Options options_;
+  FlightOptions options_;
   Config config_;
   bool real_time_;
   shm::Region flight_;
   RegionFiles flight_files_, camera_files_;  // a flight that never began leaves nothing behind
   StageTable& stages_;
+  WatchBoard board_;
+  DurationNs frame_period_ns_ = 0;
   drivers::SerialPort port_;
   drivers::AutopilotLink autopilot_;
   std::unique_ptr<shm::Region> camera_;
@@ -258,32 +271,10 @@ class Flight {
   LoopControl control_;
   std::unique_ptr<LinkLoop> link_;
   std::unique_ptr<ControlLoop> control_loop_;
+  std::unique_ptr<Supervisor> supervisor_;
   std::vector<std::function<void(LoopControl&)>> bodies_;
   std::vector<rt::Thread> threads_;  // joined first
 };
-
-std::optional<int> parse(int argc, char** argv, Options& o) {
-  CLI::App app{"The flying process alone; `wasp fly` starts it together with simulator, recorder and report."};
-  app.name("wasp flight");
-  app.option_defaults()->always_capture_default();
-  app.add_option("--instance", o.instance, "name of its shared memory: wasp.NAME.flight");
-  app.add_option("--config", o.configs, "TOML files in order, later ones override single keys")
-      ->check(CLI::ExistingFile);
-  app.add_option("--replay", o.replay, "take frames from this recording");
-  app.add_option("--seconds", o.seconds, "length of a replay (0: once through)");
-  app.add_flag("--no-rt", o.no_rt, "ordinary scheduling, no locked memory; every figure is marked 'not real time'");
-  app.add_flag("--check-rights", o.check_rights, "only say which rights real time lacks; exit code 3 if any");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? 0 : 2;
-  }
-  return std::nullopt;
-}
-
-}  // namespace
-
-namespace {
 
 /// Prints what is missing, one line a right.
 int check_rights(int priority) {
@@ -295,9 +286,15 @@ int check_rights(int priority) {
 
 }  // namespace
 
+std::vector<std::string> names_of(const BehaviourTable& table) {
+  std::vector<std::string> names;
+  for (const auto& row : table) names.push_back(row.name);
+  return names;
+}
+
 int flight_main(const BehaviourTable& behaviours, int argc, char** argv) {
-  Options options;
-  if (const auto code = parse(argc, argv, options)) return *code;
+  FlightOptions options;
+  if (const auto code = parse_flight_options(argc, argv, options)) return *code;
   if (options.check_rights) return check_rights(Config{}.control_thread.priority);
   const sigset_t signals = block_signals();
   try {

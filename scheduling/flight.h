@@ -35,8 +35,9 @@ BehaviourRow behaviour_row() {
           }};
 }
 
-/// `wasp flight`: parses its command line and flies. Exit code 0: flown to its end or stopped in order; 1: broken off
-/// or an error, said on standard error; 2: bad arguments.
+std::vector<std::string> names_of(const BehaviourTable& table);
+
+/// `wasp flight`: parses its command line and flies. Exit codes: scheduling/flight_options.cpp, its --help.
 int flight_main(const BehaviourTable& behaviours, int argc, char** argv);
 
 }  // namespace wasp::scheduling

@@ -13,17 +13,19 @@ constexpr int kReadsPerWake = 8;
 }  // namespace
 
 LinkLoop::LinkLoop(const shm::Region& flight, drivers::SerialPort& port, drivers::AutopilotLink& autopilot,
-                   StageTable& stages, rt::Seqlock<LinkReport>& report, EventQueue& events)
+                   StageTable& stages, rt::Seqlock<LinkReport>& report, EventQueue& events, ThreadWatch& watch)
     : port_(port),
       autopilot_(autopilot),
       imu_(flight, shm::kImu, "Imu"),
       attitude_(flight, shm::kAttitude, "Attitude"),
       age_(stages.add("link", "imu age", 0)),
+      compute_(stages.add("link", "compute", watch.budget_ns)),
       report_(report),
-      events_(events) {}
+      events_(events),
+      watch_(watch) {}
 
 void LinkLoop::run(LoopControl& control) {
-  RealtimeLoop loop(control);
+  RealtimeLoop loop(control, watch_);
   while (loop.tick()) {
     if (gone_)
       reopen(control);
@@ -35,6 +37,15 @@ void LinkLoop::run(LoopControl& control) {
 void LinkLoop::serve(LoopControl& control) WASP_REALTIME {
   ask_for_time(rt::now());
   if (!port_.wait_readable(rt::now() + kPatience)) return;
+  const TimeNs woken_ns = rt::now();
+  take(control);
+  const TimeNs done_ns = rt::now();
+  compute_->record(done_ns - woken_ns);
+  watch_.trace.record(done_ns, rt::TraceKind::kDone, 0, done_ns - woken_ns);
+}
+
+/// What has arrived, until the line is empty.
+void LinkLoop::take(LoopControl& control) WASP_REALTIME {
   for (int i = 0; i < kReadsPerWake; ++i) {  // bounded: a flood cannot hold this thread for ever
     const drivers::IoResult got = port_.read(buffer_);
     if (got.status == drivers::IoStatus::kGone) {

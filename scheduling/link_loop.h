@@ -16,7 +16,7 @@ namespace wasp::scheduling {
 class LinkLoop {
  public:
   LinkLoop(const shm::Region& flight, drivers::SerialPort& port, drivers::AutopilotLink& autopilot, StageTable& stages,
-           rt::Seqlock<LinkReport>& report, EventQueue& events);
+           rt::Seqlock<LinkReport>& report, EventQueue& events, ThreadWatch& watch);
   /// Runs until the stop flag. Real-time loop.
   void run(LoopControl& control);
 
@@ -30,15 +30,17 @@ class LinkLoop {
 
  private:
   void serve(LoopControl& control) WASP_REALTIME;
+  void take(LoopControl& control) WASP_REALTIME;
   void ask_for_time(TimeNs now_ns) WASP_REALTIME;
   void reopen(LoopControl& control);
 
   drivers::SerialPort& port_;
   drivers::AutopilotLink& autopilot_;
   shm::RingWriter imu_, attitude_;
-  Stage* age_;
+  Stage *age_, *compute_;
   rt::Seqlock<LinkReport>& report_;
   EventQueue& events_;
+  ThreadWatch& watch_;
   LinkReport now_;
   TimeNs received_at_ns_ = 0, timesync_due_ns_ = 0;
   bool gone_ = false;

@@ -5,8 +5,8 @@
 
 #include "rt/contract.h"
 #include "rt/syscall_filter.h"
-#include "rt/thread_faults.h"
 #include "scheduling/stage_table.h"
+#include "scheduling/thread_watch.h"
 
 namespace wasp::scheduling {
 
@@ -14,6 +14,7 @@ namespace wasp::scheduling {
 struct LoopControl {
   std::atomic<bool> stop{false};              ///< end all loops
   std::atomic<bool> stop_requested{false};    ///< land in order, then end
+  std::atomic<bool> overrun_stop{false};      ///< ... because a thread with the policy "stop" overran
   std::atomic<bool> realtime_started{false};  ///< set once every thread stands: faults count from here
   std::atomic<bool> flying{false};            ///< set once the mission has left the ground: a replay starts then
   bool strict_syscalls = false;
@@ -24,7 +25,8 @@ struct LoopControl {
 /// real time, adds them to the run status at the end.
 class RealtimeLoop {
  public:
-  explicit RealtimeLoop(LoopControl& control) : control_(control) {
+  RealtimeLoop(LoopControl& control, ThreadWatch& watch) : control_(control) {
+    watch.attach();
     if (control.strict_syscalls) rt::restrict_thread_syscalls();
   }
   ~RealtimeLoop() { add_faults(); }
@@ -35,7 +37,7 @@ class RealtimeLoop {
   bool tick() WASP_REALTIME {
     if (!marked_ && control_.realtime_started.load(std::memory_order_relaxed)) {
       marked_ = true;
-      at_start_ = rt::thread_faults();
+      at_start_ = rt::thread_usage();
     }
     return !control_.stop.load(std::memory_order_relaxed);
   }
@@ -43,12 +45,12 @@ class RealtimeLoop {
  private:
   void add_faults() noexcept {
     if (!marked_ || control_.status == nullptr) return;
-    const rt::FaultCount now = rt::thread_faults();
-    control_.status->minor_faults.fetch_add(static_cast<std::uint64_t>(now.minor - at_start_.minor));
-    control_.status->major_faults.fetch_add(static_cast<std::uint64_t>(now.major - at_start_.major));
+    const rt::ThreadUsage since = rt::thread_usage() - at_start_;
+    control_.status->minor_faults.fetch_add(static_cast<std::uint64_t>(since.minor_faults));
+    control_.status->major_faults.fetch_add(static_cast<std::uint64_t>(since.major_faults));
   }
   LoopControl& control_;
-  rt::FaultCount at_start_;
+  rt::ThreadUsage at_start_;
   bool marked_ = false;
   rt::RealtimeSection section_;
 };

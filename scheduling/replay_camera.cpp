@@ -41,13 +41,17 @@ std::vector<shm::TopicSpec> ReplayCamera::topics(const drivers::Recording& r) {
 }
 
 ReplayCamera::ReplayCamera(drivers::Recording recording, const shm::Region& camera, DurationNs length_ns,
-                           StageTable& stages)
+                           StageTable& stages, ThreadWatch& watch, rt::OverrunPolicy overrun)
     : recording_(std::move(recording)),
       length_ns_(length_ns),
       depth_(std::make_unique<shm::RingWriter>(camera, shm::kDepth, "Frame")),
       gray_(std::make_unique<shm::RingWriter>(camera, shm::kGray, "Frame")),
       pool_(recording_.depth_size().pixels(), recording_.gray_size().pixels()),
-      release_(stages.add("camera", "release", 0)) {}
+      release_(stages.add("camera", "release", 0)),
+      compute_(stages.add("camera", "compute", watch.budget_ns)),
+      watch_(watch),
+      overrun_(overrun),
+      frame_period_ns_(from_seconds(1.0 / recording_.nominal_rate_hz())) {}
 
 std::atomic<std::uint64_t>* ReplayCamera::add_reader(bool depth) {
   readers_.push_back(std::make_unique<Reader>());
@@ -117,8 +121,37 @@ void ReplayCamera::publish(const DecodedFrame& frame, TimeNs exposed_at_ns) WASP
                 exposed_at_ns);
 }
 
+void ReplayCamera::wait_for_readers(RealtimeLoop& loop) WASP_REALTIME {
+  if (readers_keep_up()) return;
+  held_back_.fetch_add(1, std::memory_order_relaxed);
+  for (const TimeNs limit = rt::now() + kPatience; !readers_keep_up() && rt::now() < limit && loop.tick();)
+    rt::sleep_until(rt::now() + kMillisecond);
+}
+
+/// The overrun policy, for a frame whose successor is due already. True: not to be published.
+bool ReplayCamera::drop_late(DurationNs late_ns, LoopControl& control) WASP_REALTIME {
+  if (late_ns <= frame_period_ns_ || overrun_ == rt::OverrunPolicy::kCatchUp) return false;
+  dropped_.fetch_add(1, std::memory_order_relaxed);
+  if (overrun_ == rt::OverrunPolicy::kStop && !control.overrun_stop.exchange(true)) control.stop_requested.store(true);
+  return true;
+}
+
+void ReplayCamera::serve(const DecodedFrame& frame, TimeNs due_ns, RealtimeLoop& loop,
+                         LoopControl& control) WASP_REALTIME {
+  rt::sleep_until(due_ns);
+  if (drop_late(rt::now() - due_ns, control)) return;
+  wait_for_readers(loop);
+  const TimeNs now_ns = rt::now();
+  publish(frame, now_ns);
+  const TimeNs done_ns = rt::now();
+  release_->record(now_ns - due_ns);
+  compute_->record(done_ns - now_ns);
+  watch_.trace.record(done_ns, rt::TraceKind::kFrame, frame.sequence, now_ns - due_ns);
+  published_.fetch_add(1, std::memory_order_relaxed);
+}
+
 void ReplayCamera::run(LoopControl& control) {
-  RealtimeLoop loop(control);
+  RealtimeLoop loop(control, watch_);
   publish_all(loop, control);
   finished_ = true;
 }
@@ -132,17 +165,8 @@ void ReplayCamera::publish_all(RealtimeLoop& loop, LoopControl& control) WASP_RE
       rt::sleep_until(rt::now() + kMillisecond);
       continue;
     }
-    const DecodedFrame& frame = pool_.frame(slot);
     if (start_ns == kNever) start_ns = rt::now() + 50 * kMillisecond;
-    const TimeNs due_ns = start_ns + frame.offset_ns;
-    rt::sleep_until(due_ns);
-    if (!readers_keep_up()) held_back_.fetch_add(1, std::memory_order_relaxed);
-    for (const TimeNs limit = rt::now() + kPatience; !readers_keep_up() && rt::now() < limit && loop.tick();)
-      rt::sleep_until(rt::now() + kMillisecond);
-    const TimeNs now_ns = rt::now();
-    publish(frame, now_ns);
-    release_->record(now_ns - due_ns);
-    published_.fetch_add(1, std::memory_order_relaxed);
+    serve(pool_.frame(slot), start_ns + pool_.frame(slot).offset_ns, loop, control);
     pool_.give_empty(slot);
   }
 }

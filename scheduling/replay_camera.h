@@ -1,6 +1,7 @@
 // The replay camera: an ordinary thread decodes ahead, a real-time thread loans ring slots and publishes each frame at
 // its recorded time, so that behaviours see a camera. Should a behaviour fall several frames behind (a stalled host),
-// the camera holds the next frame back and counts it: a replay loses nothing.
+// the camera holds the next frame back and counts it: with the overrun policy catch_up a replay loses nothing. Under
+// skip a frame that is more than one frame period late is dropped, as a camera would drop it.
 #pragma once
 
 #include <algorithm>
@@ -11,6 +12,7 @@
 #include <vector>
 
 #include "drivers/recording.h"
+#include "rt/periodic.h"
 #include "scheduling/frame_pool.h"
 #include "scheduling/realtime_loop.h"
 #include "shm/broadcast_ring.h"
@@ -20,7 +22,8 @@ namespace wasp::scheduling {
 class ReplayCamera {
  public:
   /// `camera` is the region this process writes; it has a topic for each stream the recording has.
-  ReplayCamera(drivers::Recording recording, const shm::Region& camera, DurationNs length_ns, StageTable& stages);
+  ReplayCamera(drivers::Recording recording, const shm::Region& camera, DurationNs length_ns, StageTable& stages,
+               ThreadWatch& watch, rt::OverrunPolicy overrun);
 
   /// Rings a recording needs, for Region::create.
   static std::vector<shm::TopicSpec> topics(const drivers::Recording& recording);
@@ -44,6 +47,7 @@ class ReplayCamera {
   [[nodiscard]] bool finished() const noexcept { return finished_.load(); }
   [[nodiscard]] std::uint64_t published() const noexcept { return published_.load(); }
   [[nodiscard]] std::uint64_t held_back() const noexcept { return held_back_.load(); }
+  [[nodiscard]] std::uint64_t dropped() const noexcept { return dropped_.load(); }
   [[nodiscard]] std::uint64_t decode_errors() const noexcept { return decode_errors_.load(); }
 
  private:
@@ -55,15 +59,21 @@ class ReplayCamera {
   void publish_all(RealtimeLoop& loop, LoopControl& control) WASP_REALTIME;
   void publish(const DecodedFrame& frame, TimeNs exposed_at_ns) WASP_REALTIME;
   [[nodiscard]] bool readers_keep_up() const noexcept;
+  void wait_for_readers(RealtimeLoop& loop) WASP_REALTIME;
+  bool drop_late(DurationNs late_ns, LoopControl& control) WASP_REALTIME;
+  void serve(const DecodedFrame& frame, TimeNs due_ns, RealtimeLoop& loop, LoopControl& control) WASP_REALTIME;
 
   drivers::Recording recording_;
   DurationNs length_ns_;
   std::unique_ptr<shm::RingWriter> depth_, gray_;
   FramePool pool_;
   std::vector<std::unique_ptr<Reader>> readers_;
-  Stage* release_;
+  Stage *release_, *compute_;
+  ThreadWatch& watch_;
+  rt::OverrunPolicy overrun_;
+  DurationNs frame_period_ns_;
   std::atomic<bool> all_decoded_{false}, finished_{false};
-  std::atomic<std::uint64_t> published_{0}, held_back_{0}, decode_errors_{0};
+  std::atomic<std::uint64_t> published_{0}, held_back_{0}, decode_errors_{0}, dropped_{0};
 };
 
 }  // namespace wasp::scheduling

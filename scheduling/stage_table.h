@@ -58,6 +58,16 @@ struct StageTable {
   }
 };
 
+/// How a mission stands or ended.
+enum class MissionResult : std::uint32_t { kUnderWay = 0, kFlown = 1, kBrokenOff = 2, kStoppedEarly = 3 };
+
+/// How punctual a behaviour is.
+enum class BehaviourState : std::uint32_t {
+  kPunctual = 0,
+  kOverBudget = 1,  ///< its last step was over its budget, or the one under way is: the cue is stale
+  kDemoted = 2      ///< taken out of SCHED_FIFO for this flight
+};
+
 /// Block topic "run" (type RunStatus): the state of the flight in single words. One writer a word.
 struct RunStatus {
   std::atomic<std::uint32_t> real_time{0};   ///< 1: policies and memory lock in force; 0: "not real time"
@@ -74,7 +84,12 @@ struct RunStatus {
   std::atomic<std::uint64_t> link_reconnects{0};
   std::atomic<std::uint32_t> behaviour_count{0};
   std::array<std::array<char, 32>, 16> behaviours{};  ///< names by Cue::behaviour index
-  std::atomic<std::uint32_t> mission_result{0};       ///< 0 under way, 1 flown to its end, 2 broken off
+  std::atomic<std::uint32_t> mission_result{0};       ///< MissionResult
+  std::atomic<std::uint32_t> incidents{0};            ///< misses of which a file was to be written
+  std::atomic<std::uint64_t> commands_refused{0};     ///< too old at the moment they were to go out
+  std::atomic<std::uint64_t> setpoints_flushed{0};    ///< times an old setpoint was thrown out of a stalled line
+  std::atomic<std::uint64_t> behaviour_ticks{0};      ///< control ticks commanded by behaviours
+  std::array<std::atomic<std::uint32_t>, 16> behaviour_state{};  ///< BehaviourState by Cue::behaviour index
 };
 
 }  // namespace wasp::scheduling

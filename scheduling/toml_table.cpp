@@ -12,6 +12,14 @@ TomlTable TomlTable::parse_file(const std::string& path) {
   }
 }
 
+TomlTable TomlTable::parse(std::istream& text, const std::string& name) {
+  try {
+    return TomlTable(toml::parse(text, name));
+  } catch (const std::exception& e) {
+    throw ConfigError("configuration '" + name + "': " + e.what());
+  }
+}
+
 std::string TomlTable::text(double x) { return fmt::format("{:g}", x); }
 
 void TomlTable::fail(const toml::value& v, const std::string& why) {

@@ -20,6 +20,8 @@ class TomlTable {
  public:
   /// Throws ConfigError if the file cannot be read or is not TOML.
   static TomlTable parse_file(const std::string& path);
+  /// The same of a stream; `name` stands in error messages.
+  static TomlTable parse(std::istream& text, const std::string& name);
   explicit TomlTable(toml::value value) : value_(std::move(value)) {}
 
   /// Leaves `out` as it is when the key is absent. Range is inclusive.

@@ -35,11 +35,12 @@ class Line {
 };
 
 constexpr std::array<std::string_view, 5> kModes = {"disarmed", "hold", "behaviour", "manual", "failsafe"};
-constexpr std::array<std::string_view, 15> kReasons = {
+constexpr std::array<std::string_view, 16> kReasons = {
     "none",          "start",          "mission_step",    "cue_lost",       "cue_back",
     "attitude_lost", "attitude_back",  "link_lost",       "link_back",      "pilot",
-    "not_finite",    "autopilot_left", "deadline_missed", "stop_requested", "landed"};
-static_assert(static_cast<std::size_t>(ModeReason::kLanded) + 1 == kReasons.size());
+    "not_finite",    "autopilot_left", "deadline_missed", "stop_requested", "landed",
+    "too_old"};
+static_assert(static_cast<std::size_t>(ModeReason::kTooOld) + 1 == kReasons.size());
 static_assert(static_cast<std::size_t>(FlightMode::kFailsafe) + 1 == kModes.size());
 
 }  // namespace

@@ -89,6 +89,8 @@ std::vector<Result> timing_results(const RunSummary& run, double allowed_miss_sh
   results.push_back(faults("minor page faults in real-time threads", run.minor_faults));
   results.push_back(faults("major page faults in real-time threads", run.major_faults));
   results.push_back({"frames lost to a lapping writer", static_cast<double>(run.frames_lost), "", "", true});
+  results.push_back({"incident files written", static_cast<double>(run.incidents), "", "", true});
+  results.push_back({"commands refused as too old", static_cast<double>(run.commands_refused), "", "", true});
   results.push_back({"link frames with a bad checksum", static_cast<double>(run.bad_frames), "", "", true});
   return results;
 }

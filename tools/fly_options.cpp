@@ -25,8 +25,10 @@ bool plain(const std::string& name) {
 std::optional<int> parse_fly_options(int argc, char** argv, FlyOptions& o) {
   CLI::App app{
       "Flies a mission with the real-time flight process: in the simulator (default), or on a recording with\n"
-      "--replay. Writes OUT/NAME/ with log/ and report.html. Exit code 0 only if the mission succeeded and no\n"
-      "deadline was missed beyond what the run allows."};
+      "--replay. Writes OUT/NAME/ with log/ and report.html. Exit code 0 only if the mission was flown to its\n"
+      "end, behaviours commanded it, and every bar was met; 4: nothing failed, but it was stopped early or no "
+      "behaviour\n"
+      "ever commanded; 2: bad arguments; 1: anything else."};
   app.name("wasp fly");
   app.option_defaults()->always_capture_default();
   app.add_option("--mission", o.mission, "take off, hold each configured height, land")

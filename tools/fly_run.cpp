@@ -51,6 +51,7 @@ std::vector<control::HoverLeg> configured_legs(const FlyOptions& o) {
 void write_override(Run& run) {
   std::string text = "# written by wasp fly for this run\n[run]\n";
   text += fmt::format("enforce_real_time = {}\nstrict_syscalls = {}\n", run.real_time, run.options.strict_syscalls);
+  text += fmt::format("incident_dir = \"{}\"\n", fs::absolute(run.folder / "incidents").string());
   text += fmt::format("[autopilot]\nendpoint = \"serial:{}:921600\"\n", fs::absolute(run.folder / "tty").string());
   if (run.options.replay.empty()) {
     std::string heights, seconds;

@@ -19,6 +19,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr int kEndedShort = 4;  // of wasp flight and wasp fly: in order, but short of its purpose
+
 std::string scheduler_text(const Run& run) {
   return run.real_time ? "SCHED_FIFO, locked memory" : "SCHED_OTHER (not real time)";
 }
@@ -53,9 +55,13 @@ nlohmann::json run_document(const Run& run, const std::vector<Phase>& phases, co
 std::vector<Result> judge(const Run& run, int flight_code, const std::vector<Phase>& phases,
                           const RunSummary& summary) {
   std::vector<Result> results;
-  results.push_back({"flight process exit code", static_cast<double>(flight_code), "", "== 0", flight_code == 0});
+  const bool ended_short = flight_code == kEndedShort;  // neither a success nor a failure
+  results.push_back({"flight process exit code", static_cast<double>(flight_code), "", ended_short ? "" : "== 0",
+                     ended_short || flight_code == 0});
+  results.push_back({"mission flown to its end", summary.mission_result == 1 ? 1.0 : 0.0, "", ended_short ? "" : "== 1",
+                     ended_short || summary.mission_result == 1});
   results.push_back(
-      {"mission flown to its end", summary.mission_result == 1 ? 1.0 : 0.0, "", "== 1", summary.mission_result == 1});
+      {"control ticks commanded by behaviours", static_cast<double>(summary.behaviour_ticks), "", "", true});
   if (run.options.replay.empty())
     for (auto& r : hover_results(run.folder / "log", phases)) results.push_back(std::move(r));
   for (auto& r : timing_results(summary, allowed_share(run))) results.push_back(std::move(r));
@@ -74,10 +80,12 @@ int conclude(Run& run, int flight_code, bool interrupted) {
       summary = run_from_json(doc);
     }
   }
-  run.exit_reason = interrupted && flight_code == 0 ? "interrupted by the user, landed in order"
+  const bool in_order = flight_code == 0 || flight_code == kEndedShort;
+  run.exit_reason = interrupted && in_order ? "interrupted by the user, landed in order"
                     : interrupted
                         ? fmt::format("interrupted by the user; flight process ended with code {}", flight_code)
                     : flight_code == 0 ? "mission ended in order"
+                    : in_order         ? "mission ended in order, but short of its purpose: see log/flight.txt"
                                        : fmt::format("flight process ended with code {}", flight_code);
   const auto phases = read_phases(run.folder / "log");
   const auto results = judge(run, flight_code, phases, summary);
@@ -106,10 +114,13 @@ int conclude(Run& run, int flight_code, bool interrupted) {
   }
   if (flight_code != 0)
     if (std::ifstream log(run.folder / "log/flight.txt"); log) std::cerr << log.rdbuf();
+  const bool ended_short = flight_code == kEndedShort;
   if (!run.options.json)
-    std::cout << (ok ? "mission succeeded" : "MISSION FAILED") << "; report: " << (run.folder / "report.html").string()
-              << "\n";
-  return ok ? 0 : 1;
+    std::cout << (!ok           ? "MISSION FAILED"
+                  : ended_short ? "MISSION NOT COMPLETED"
+                                : "mission succeeded")
+              << "; report: " << (run.folder / "report.html").string() << "\n";
+  return !ok ? 1 : ended_short ? kEndedShort : 0;
 }
 
 }  // namespace wasp::tools

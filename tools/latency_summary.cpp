@@ -90,9 +90,16 @@ RunSummary read_run(const shm::Region& flight) {
   s.frames_lost = run->frames_lost.load(kRelaxed);
   s.bad_frames = run->bad_frames.load(kRelaxed);
   s.link_reconnects = run->link_reconnects.load(kRelaxed);
+  s.incidents = run->incidents.load(kRelaxed);
+  s.commands_refused = run->commands_refused.load(kRelaxed);
+  s.setpoints_flushed = run->setpoints_flushed.load(kRelaxed);
+  s.behaviour_ticks = run->behaviour_ticks.load(kRelaxed);
   s.mission_result = run->mission_result.load(kRelaxed);
   const std::size_t n = std::min<std::size_t>(run->behaviour_count.load(kRelaxed), run->behaviours.size());
-  for (std::size_t i = 0; i < n; ++i) s.behaviours.push_back(text_of(run->behaviours[i]));
+  for (std::size_t i = 0; i < n; ++i) {
+    s.behaviours.push_back(text_of(run->behaviours[i]));
+    s.behaviour_states.push_back(run->behaviour_state[i].load(kRelaxed));
+  }
   return s;
 }
 
@@ -110,7 +117,12 @@ nlohmann::json run_json(const RunSummary& s) {
           {"frames_lost", s.frames_lost},
           {"bad_frames", s.bad_frames},
           {"link_reconnects", s.link_reconnects},
+          {"incidents", s.incidents},
+          {"commands_refused", s.commands_refused},
+          {"setpoints_flushed", s.setpoints_flushed},
+          {"behaviour_ticks", s.behaviour_ticks},
           {"mission_result", s.mission_result},
+          {"behaviour_states", s.behaviour_states},
           {"behaviours", s.behaviours}};
 }
 
@@ -144,7 +156,12 @@ RunSummary run_from_json(const nlohmann::json& document) {
   s.frames_lost = run.value("frames_lost", s.frames_lost);
   s.bad_frames = run.value("bad_frames", s.bad_frames);
   s.link_reconnects = run.value("link_reconnects", s.link_reconnects);
+  s.incidents = run.value("incidents", s.incidents);
+  s.commands_refused = run.value("commands_refused", s.commands_refused);
+  s.setpoints_flushed = run.value("setpoints_flushed", s.setpoints_flushed);
+  s.behaviour_ticks = run.value("behaviour_ticks", s.behaviour_ticks);
   s.mission_result = run.value("mission_result", s.mission_result);
+  s.behaviour_states = run.value("behaviour_states", s.behaviour_states);
   s.behaviours = run.value("behaviours", s.behaviours);
   return s;
 }

@@ -202,11 +202,11 @@ void counters(const ReportData& data, Out out) {
   const RunSummary& s = data.status;
   fmt::format_to(out, "<h2>Counters of the flight process</h2>\n<div class='card scroll'><table><tr>");
   for (const char* name : {"Ticks", "Skipped", "Deadline misses", "Minor faults", "Major faults", "Frames lost",
-                           "Bad link frames", "Reconnects"})
+                           "Bad link frames", "Reconnects", "Incidents", "Refused as too old", "Setpoints flushed"})
     fmt::format_to(out, "<th class='n'>{}</th>", name);
   fmt::format_to(out, "</tr><tr>");
   for (const auto n : {s.ticks, s.skipped, s.deadline_misses, s.minor_faults, s.major_faults, s.frames_lost,
-                       s.bad_frames, s.link_reconnects})
+                       s.bad_frames, s.link_reconnects, s.incidents, s.commands_refused, s.setpoints_flushed})
     fmt::format_to(out, "<td class='n'>{}</td>", n);
   fmt::format_to(out, "</tr></table></div>\n");
 }

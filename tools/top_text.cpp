@@ -16,7 +16,16 @@ std::string age_text(const std::optional<double>& age_ms) {
 }
 
 std::string_view mission_text(std::uint32_t result) {
-  return result == 1 ? "flown to its end" : result == 2 ? "broken off" : "under way";
+  return result == 1 ? "flown to its end" : result == 2 ? "broken off" : result == 3 ? "stopped early" : "under way";
+}
+
+/// Behaviours that are not punctual, by name; empty when all are.
+std::string late_behaviours(const RunSummary& r) {
+  std::string text;
+  for (std::size_t i = 0; i < std::min(r.behaviours.size(), r.behaviour_states.size()); ++i)
+    if (r.behaviour_states[i] != 0)
+      text += fmt::format("   {} {}", r.behaviours[i], r.behaviour_states[i] == 1 ? "OVER BUDGET" : "DEMOTED");
+  return text;
 }
 
 void add_regions(const TopSnapshot& s, Lines& lines) {
@@ -51,6 +60,8 @@ void add_flight(const TopSnapshot& s, Lines& lines) {
       mission_text(r.mission_result), r.ticks, r.skipped, r.deadline_misses, r.minor_faults, r.major_faults));
   lines.push_back(fmt::format("frames lost {}   bad link frames {}   link reconnects {}", r.frames_lost, r.bad_frames,
                               r.link_reconnects));
+  lines.push_back(fmt::format("incidents {}   refused as too old {}   old setpoints flushed {}{}", r.incidents,
+                              r.commands_refused, r.setpoints_flushed, late_behaviours(r)));
 }
 
 void add_topics(const TopSnapshot& s, Lines& lines) {

@@ -99,6 +99,7 @@ enum class ModeReason : std::uint8_t {
   kDeadlineMissed,
   kStopRequested,
   kLanded,
+  kTooOld,
 };
 
 /// One control tick: what was commanded and how long it took.
@@ -120,6 +121,8 @@ struct Command {
   ModeReason reason = ModeReason::kNone;
   std::uint8_t sent = 0;
   std::uint8_t mission_phase = 0;
+  std::uint8_t refused = 0;  ///< control::Refusal: why the arbiter's own command did not go out
+  std::uint8_t reserved[3] = {};
 };
 
 /// The simulator's own truth; no flight thread reads it.

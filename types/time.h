@@ -10,6 +10,7 @@ using TimeNs = std::int64_t;      ///< an instant, CLOCK_MONOTONIC [ns]
 using DurationNs = std::int64_t;  ///< a difference of two instants [ns]
 
 inline constexpr TimeNs kNever = INT64_MIN;  ///< "has not happened"
+inline constexpr TimeNs kForever = INT64_MAX;  ///< "does not happen"
 inline constexpr DurationNs kMicrosecond = 1'000;
 inline constexpr DurationNs kMillisecond = 1'000'000;
 inline constexpr DurationNs kSecond = 1'000'000'000;

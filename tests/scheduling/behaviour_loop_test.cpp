@@ -60,6 +60,7 @@ class BehaviourLoopTest : public ::testing::Test {
     w.flight = &flight_;
     w.budget_ns = Mean::kBudgetNs;
     w.stages = &stage_table(flight_);
+    w.watch = &board_.add({"mean", -1, 0, Mean::kBudgetNs});
     return w;
   }
   void publish_frame(std::uint32_t sequence, std::uint8_t value, TimeNs exposed_at_ns, std::uint32_t stride = kWidth) {
@@ -94,6 +95,7 @@ class BehaviourLoopTest : public ::testing::Test {
   shm::RingWriter gray_, attitude_;
   shm::RingReader cues_;
   LoopControl control_;
+  WatchBoard board_;
 };
 
 TEST_F(BehaviourLoopTest, CueCarriesInputsAndTimes) {

@@ -1,0 +1,23 @@
+// The command line of `wasp flight`.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace wasp::scheduling {
+
+struct FlightOptions {
+  std::string instance = "wasp";
+  std::vector<std::string> configs;
+  std::string replay;
+  double seconds = 0;
+  std::string measured;
+  bool no_rt = false;
+  bool check_rights = false;
+};
+
+/// An exit code when the program is to end at once (help, bad arguments).
+std::optional<int> parse_flight_options(int argc, char** argv, FlightOptions& options);
+
+}  // namespace wasp::scheduling

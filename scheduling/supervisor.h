@@ -1,0 +1,75 @@
+// The ordinary thread's eye on the real-time threads: writes an incident for a miss, and takes a behaviour that does
+// not keep to its budget out of SCHED_FIFO before it can starve the others. It never waits for a real-time thread, and
+// none waits for it.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "scheduling/incident_folder.h"
+#include "scheduling/stage_table.h"
+#include "scheduling/switch_trace.h"
+#include "scheduling/thread_watch.h"
+
+namespace wasp::scheduling {
+
+struct SupervisorOptions {
+  std::string instance;
+  bool real_time = true;
+  int demote_after = 10;  ///< steps over budget in a row, or one step that takes as long as so many budgets; 0: never
+  int incidents = 8;
+  std::string incident_dir = "incidents";
+  bool trace_switches = true;
+  std::string tracefs;
+};
+
+class Supervisor {
+ public:
+  /// A look this often is enough: a runaway behaviour must be demoted before the kernel throttles all real-time threads
+  /// of its core (950 ms by default).
+  static constexpr DurationNs kPeriod = 50 * kMillisecond;
+
+  /// Misses of a thread that follow its incident within this time belong to it: one stall, one file.
+  static constexpr DurationNs kSameIncident = 500 * kMillisecond;
+
+  /// `board` holds all threads, the control thread by the name "control". `log` is called by look() only.
+  Supervisor(WatchBoard& board, RunStatus& status, SupervisorOptions options,
+             std::function<void(const std::string&)> log);
+  /// Once every kPeriod. Ordinary thread.
+  void look();
+
+ private:
+  struct Subject {
+    ThreadWatch* watch = nullptr;
+    bool behaviour = false;
+    std::optional<ThreadCounts> before, within;  ///< at the last look; since then
+    TimeNs busy_since_ns = 0;                    ///< at the last look
+    TimeNs incident_at_ns = kNever;              ///< of its last file
+    std::uint64_t followed = 0;                  ///< misses counted with that file
+  };
+  void count();
+  void report();
+  bool take_first(Subject& subject, Miss& first, std::uint64_t& more);
+  void write(Subject& subject, const Miss& miss, std::uint64_t more);
+  Incident gather(const Subject& subject, const Miss& miss) const;
+  void hush();
+  void demote_if_runaway(Subject& subject);
+
+  WatchBoard& board_;
+  RunStatus& status_;
+  SupervisorOptions options_;
+  std::function<void(const std::string&)> log_;
+  IncidentFolder folder_;
+  std::unique_ptr<SwitchTrace> trace_;
+  std::string trace_why_not_;
+  std::vector<Subject> subjects_;
+  std::vector<KernelEvent> kernel_events_;
+  std::optional<CoreCounts> core_before_, core_within_;
+  int core_ = -1;
+  TimeNs looked_at_ns_ = 0;
+  DurationNs window_ns_ = 0;
+};
+
+}  // namespace wasp::scheduling

@@ -1,0 +1,155 @@
+// The control thread itself, stalled for 130 ms in the middle of a tick: what each overrun policy makes of it, on the
+// grid and on the wire, and what becomes of a command that grew too old meanwhile.
+#include "scheduling/control_loop.h"
+
+#include "tests/scheduling/control_bench.h"
+
+namespace wasp::scheduling {
+namespace {
+
+constexpr DurationNs kStall = 130 * kMillisecond;
+
+/// A host that stands still by itself can spoil a stall of ours: five attempts, a defect spoils all.
+template <class Attempt>
+void expect_once(Attempt&& attempt) {
+  for (int i = 0; i < 5; ++i)
+    if (attempt()) return;
+  ADD_FAILURE() << "not once in five attempts";
+}
+
+/// Flies, stalls one tick, and goes on for ten more.
+void fly_with_stall(ControlBench& bench) {
+  bench.start();
+  ASSERT_TRUE(bench.wait_until_flying());
+  bench.stall_once(kStall);
+  for (int i = 0; i < 30'000 && bench.stalled_tick() == 0; ++i) rt::sleep_until(rt::now() + 2 * kMillisecond);
+  ASSERT_NE(bench.stalled_tick(), 0u);
+  ASSERT_TRUE(bench.wait_for_tick(bench.stalled_tick() + 10));
+  bench.end();
+}
+
+void expect_an_unmoved_grid(const ControlBench& bench) {
+  const Command& first = bench.commands.front();
+  for (const auto& c : bench.commands)
+    EXPECT_EQ(c.due_at_ns, first.due_at_ns + static_cast<DurationNs>(c.tick - first.tick) * bench.period_ns());
+}
+
+TEST(ControlLoop, SkipPassesOverExactlyTwoReleasesOfAStallOf130Milliseconds) {
+  expect_once([] {
+    ControlBench bench({.overrun = rt::OverrunPolicy::kSkip});
+    fly_with_stall(bench);
+    expect_an_unmoved_grid(bench);
+    const std::uint64_t k = bench.stalled_tick();
+    const Command *stalled = bench.command_of(k), *next = bench.command_of(k + 3);
+    EXPECT_GE(bench.status().skipped.load(), 2u);
+    if (stalled == nullptr || next == nullptr || bench.status().skipped.load() != 2) return false;
+    EXPECT_EQ(bench.command_of(k + 1), nullptr);
+    EXPECT_EQ(bench.command_of(k + 2), nullptr);
+    EXPECT_GE(stalled->written_at_ns - stalled->due_at_ns, kStall);  // from the intended release
+    EXPECT_GE(bench.status().deadline_misses.load(), 1u);
+    return true;
+  });
+}
+
+TEST(ControlLoop, CatchUpServesTheLateReleasesInTurnWithTheirOwnLateness) {
+  expect_once([] {
+    ControlBench bench({.overrun = rt::OverrunPolicy::kCatchUp});
+    fly_with_stall(bench);
+    expect_an_unmoved_grid(bench);
+    const std::uint64_t k = bench.stalled_tick();
+    const Command *one = bench.command_of(k + 1), *two = bench.command_of(k + 2);
+    EXPECT_TRUE(one != nullptr && two != nullptr);
+    if (one == nullptr || two == nullptr || bench.status().skipped.load() != 0) return false;
+    EXPECT_GE(one->released_at_ns - one->due_at_ns, kStall - bench.period_ns());
+    EXPECT_GE(two->released_at_ns - two->due_at_ns, kStall - 2 * bench.period_ns());
+    EXPECT_LE(one->written_at_ns, two->released_at_ns);
+    EXPECT_GE(bench.status().deadline_misses.load(), 3u);
+    return true;
+  });
+}
+
+TEST(ControlLoop, StopLandsInOrderAndNeverFallsSilent) {
+  ControlBench bench({.overrun = rt::OverrunPolicy::kStop});
+  fly_with_stall(bench);
+  expect_an_unmoved_grid(bench);
+  EXPECT_TRUE(bench.control.overrun_stop);
+  EXPECT_TRUE(bench.said("policy stop")) << ::testing::PrintToString(bench.event_texts());
+  EXPECT_TRUE(bench.said("mission ends early: stop requested"));
+  const Command& last = bench.commands.back();
+  EXPECT_EQ(static_cast<control::MissionPhase>(last.mission_phase), control::MissionPhase::kLand);
+  for (const auto& c : bench.commands)
+    if (c.tick > bench.stalled_tick()) {
+      EXPECT_EQ(c.sent, 1);
+      EXPECT_GT(c.thrust, 0.f);
+    }
+}
+
+TEST(ControlLoop, ACueThatGrewTooOldBeforeTheWriteIsRefusedAndHoldGoesOut) {
+  ControlBench bench({.cue_age_limit_ns = 100 * kMillisecond});
+  fly_with_stall(bench);
+  const Command* stalled = bench.command_of(bench.stalled_tick());
+  ASSERT_NE(stalled, nullptr);
+  EXPECT_EQ(stalled->refused, static_cast<std::uint8_t>(control::Refusal::kCueTooOld));
+  EXPECT_EQ(stalled->mode, FlightMode::kHold);
+  EXPECT_EQ(stalled->reason, ModeReason::kTooOld);
+  EXPECT_EQ(stalled->exposed_at_ns, kNever);
+  EXPECT_GE(bench.status().commands_refused.load(), 1u);
+  EXPECT_TRUE(bench.said("command refused: its cue grew too old"));
+  // On the wire: what went out in that tick is on its way to level, away from the behaviour's pitch.
+  const auto setpoints = bench.setpoints();
+  float pitch_before = 0;
+  for (const auto& s : setpoints) {
+    if (static_cast<TimeNs>(s.time_boot_ms) == stalled->computed_at_ns / kMillisecond % (TimeNs{1} << 32)) {
+      EXPECT_LT(s.q[2], pitch_before);
+    }
+    pitch_before = s.q[2];
+  }
+}
+
+TEST(ControlLoop, AnAttitudeThatGrewTooOldBeforeTheWriteMeansFailsafe) {
+  ControlBench bench({.attitude_age_limit_ns = 100 * kMillisecond});
+  fly_with_stall(bench);
+  const Command* stalled = bench.command_of(bench.stalled_tick());
+  ASSERT_NE(stalled, nullptr);
+  EXPECT_EQ(stalled->refused, static_cast<std::uint8_t>(control::Refusal::kAttitudeTooOld));
+  EXPECT_EQ(stalled->mode, FlightMode::kFailsafe);
+  EXPECT_TRUE(bench.said("command refused: its attitude grew too old"));
+}
+
+TEST(ControlLoop, SaysWhyAVehicleFoundArmedIsNotAdopted) {
+  ControlBench bench({.found_armed = true});
+  bench.start();
+  for (int i = 0; i < 30'000 && bench.status().mission_result.load() == 0; ++i)
+    rt::sleep_until(rt::now() + 2 * kMillisecond);
+  bench.end();
+  EXPECT_EQ(bench.status().mission_result.load(), static_cast<std::uint32_t>(MissionResult::kBrokenOff));
+  EXPECT_TRUE(bench.said("found armed, not adopted"));
+  EXPECT_TRUE(bench.setpoints().empty());
+}
+
+TEST(SetpointLine, AStalledLineIsFlushedSoThatNoOldSetpointGoesOutLater) {
+  PtyLine line;
+  drivers::SerialPort port(drivers::SerialEndpoint::parse(line.endpoint()));
+  SetpointLine setpoints(port);
+  std::vector<std::uint8_t> setpoint(51, 0);
+  int written = 0;
+  for (bool flushed = false; !flushed && written < 10'000; ++written) {  // nobody reads: the line fills up
+    setpoint.assign(51, static_cast<std::uint8_t>(written % 200));
+    const auto sent = setpoints.send(setpoint, setpoint.size());
+    EXPECT_NE(sent.setpoint_whole, sent.flushed);
+    flushed = sent.flushed;
+  }
+  ASSERT_LT(written, 10'000);
+  setpoint.assign(51, 255);
+  EXPECT_TRUE(setpoints.send(setpoint, setpoint.size()).setpoint_whole);
+  std::vector<std::uint8_t> arrived;
+  for (int i = 0; i < 1000 && arrived.size() < setpoint.size(); ++i) {
+    const auto more = line.read();
+    arrived.insert(arrived.end(), more.begin(), more.end());
+    rt::sleep_until(rt::now() + kMillisecond);
+  }
+  EXPECT_EQ(arrived, setpoint);  // the newest, and nothing of the 300 that waited before it
+}
+
+}  // namespace
+}  // namespace wasp::scheduling
