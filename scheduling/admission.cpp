@@ -63,7 +63,8 @@ MeasuredCosts read_measured_costs(const std::string& path) {
   if (!file) throw std::runtime_error("cannot read measured stages '" + path + "'");
   MeasuredCosts costs;
   try {
-    for (const auto& row : nlohmann::json::parse(file).at("stages")) {
+    const auto document = nlohmann::json::parse(file);
+    for (const auto& row : document.at("stages")) {
       const std::string stage = row.at("stage");
       if (row.at("count").get<std::uint64_t>() > 0 && (stage == "compute" || stage == "write"))
         costs[row.at("owner").get<std::string>()] += row.at("max_ns").get<DurationNs>();

@@ -82,6 +82,28 @@ TEST_F(ArbiterTest, AvoidForbidsForwardPitch) {
   EXPECT_FLOAT_EQ(arbitrate(params, set, 1).pitch_rad, 0.f);
 }
 
+TEST_F(ArbiterTest, ASourceThatIsOverItsBudgetAtThisMomentIsAskedLastButNotForgotten) {
+  give(0, height_cue(0, 1.f));
+  set.overdue[0] = true;
+  EXPECT_EQ(arbitrate(params, set, 1).height_source, 0);  // its last cue was made in time and is not old
+  give(1, height_cue(0, 2.f));
+  EXPECT_EQ(arbitrate(params, set, 1).height_source, 1);
+  set.overdue[1] = true;
+  EXPECT_EQ(arbitrate(params, set, 1).height_source, 0);
+}
+
+TEST_F(ArbiterTest, AnIntentionLastsUntilTheFirstOfItsCuesIsTooOld) {
+  params.rows[1].heading_weight = 1.f;
+  params.rows[0].age_limit_ns = 100;
+  params.rows[1].age_limit_ns = 20;
+  give(0, height_cue(10, 1.f));
+  give(1, height_cue(50, 1.f));
+  EXPECT_EQ(arbitrate(params, set, 60).usable_until_ns, 70);
+  params.rows[1].heading_weight = 0.f;  // not used: its age does not matter
+  EXPECT_EQ(arbitrate(params, set, 60).usable_until_ns, 110);
+  EXPECT_EQ(arbitrate(params, {}, 60).usable_until_ns, kForever);
+}
+
 TEST_F(ArbiterTest, EvidenceIsTheOldestUsed) {
   params.rows[1].heading_weight = 1.f;
   give(0, height_cue(50, 1.f));

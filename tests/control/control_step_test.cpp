@@ -57,6 +57,69 @@ TEST(ControlStep, AVehicleFoundArmedIsNotAdopted) {
   }
 }
 
+/// A tick in flight with the behaviour commanding.
+ControlOutput in_flight(const ControlParams& p, ControlInput& in, ControlState& state) {
+  state = on_the_ground(p);
+  ControlOutput out;
+  for (int i = 1; i < 40; ++i) {
+    in = good_input(i * 50 * kMillisecond);
+    in.autopilot.armed = in.autopilot.follows = i > 4;
+    out = control_step(p, in, state);
+  }
+  return out;
+}
+
+TEST(ControlStep, ACommandSaysUntilWhenItMayGoOut) {
+  ControlInput in;
+  ControlState state;
+  const ControlParams p = params();
+  const ControlOutput out = in_flight(p, in, state);
+  ASSERT_EQ(out.command.mode, FlightMode::kBehaviour);
+  const TimeNs cue_until = in.cues.cues[0].exposed_at_ns + p.arbiter.rows[0].age_limit_ns;
+  const TimeNs attitude_until = in.attitude.exposed_at_ns + p.attitude_age_limit_ns;
+  EXPECT_EQ(out.cue_until_ns, cue_until);
+  EXPECT_EQ(out.attitude_until_ns, attitude_until);
+  EXPECT_EQ(refusal_at(out, std::min(cue_until, attitude_until)), Refusal::kNone);
+  EXPECT_EQ(refusal_at(out, attitude_until + 1), Refusal::kAttitudeTooOld);
+  ControlOutput cue_only = out;
+  cue_only.attitude_until_ns = kForever;
+  EXPECT_EQ(refusal_at(cue_only, cue_until + 1), Refusal::kCueTooOld);
+}
+
+TEST(ControlStep, ARefusedCommandBecomesHoldOrFailsafeWithinTheLimits) {
+  for (const Refusal refusal : {Refusal::kCueTooOld, Refusal::kAttitudeTooOld}) {
+    ControlInput in;
+    ControlState state;
+    ControlParams p = params();
+    ControlOutput out = in_flight(p, in, state);
+    const float thrust = out.command.thrust;
+    refuse(p, in, refusal, state, out);
+    EXPECT_EQ(out.command.mode, refusal == Refusal::kCueTooOld ? FlightMode::kHold : FlightMode::kFailsafe);
+    EXPECT_EQ(out.command.reason, ModeReason::kTooOld);
+    EXPECT_EQ(out.command.refused, static_cast<std::uint8_t>(refusal));
+    EXPECT_EQ(out.command.exposed_at_ns, kNever);
+    EXPECT_EQ(out.command.sent, 1);
+    EXPECT_NEAR(out.command.thrust, thrust, p.limits.max_thrust_rate_1ps * in.dt_s + 1e-6f);
+    p.failsafe_action = FailsafeAction::kStopStream;
+    out.command.sent = 1;
+    refuse(p, in, refusal, state, out);
+    EXPECT_EQ(out.command.sent, refusal == Refusal::kCueTooOld ? 1 : 0);
+  }
+}
+
+TEST(ControlStep, HoldAndFailsafeRestOnNoCue) {
+  ControlInput in;
+  ControlState state;
+  const ControlParams p = params();
+  in_flight(p, in, state);
+  in.now_ns += 50 * kMillisecond;
+  in.cues.present.fill(false);
+  const ControlOutput out = control_step(p, in, state);
+  EXPECT_EQ(out.command.mode, FlightMode::kHold);
+  EXPECT_EQ(out.cue_until_ns, kForever);
+  EXPECT_NE(out.attitude_until_ns, kForever);
+}
+
 TEST(ControlStep, NothingIsSentBeforeTheAutopilotWasHeard) {
   ControlState state;
   ControlInput in = good_input(50 * kMillisecond);

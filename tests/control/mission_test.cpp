@@ -82,6 +82,7 @@ TEST(Mission, ALandingThatNeverEndsIsBrokenOff) {
   v.input.ground_seen = false;
   v.run(61 * 20);
   EXPECT_EQ(v.state.phase, MissionPhase::kBroken);
+  EXPECT_EQ(v.state.early_end, EarlyEnd::kNoGround);
 }
 
 TEST(Mission, GivesUpWhenTheGroundIsNeverSeen) {
@@ -89,6 +90,25 @@ TEST(Mission, GivesUpWhenTheGroundIsNeverSeen) {
   v.run(static_cast<int>(v.params.patience_s * 20) + 10);
   EXPECT_EQ(v.state.phase, MissionPhase::kBroken);
   EXPECT_FALSE(v.input.armed);
+  EXPECT_EQ(v.state.early_end, EarlyEnd::kNoPatience);
+}
+
+TEST(Mission, SaysWhyItEndedEarly) {
+  Obedient found;
+  found.input.ground_seen = found.input.heard = found.input.armed = true;
+  found.run(2);
+  EXPECT_EQ(found.state.early_end, EarlyEnd::kFoundArmed);
+  Obedient stopped = standing();
+  stopped.run(60);
+  stopped.input.stop_requested = true;
+  stopped.run(2);
+  EXPECT_EQ(stopped.state.phase, MissionPhase::kLand);
+  EXPECT_EQ(stopped.state.early_end, EarlyEnd::kStopped);
+  Obedient whole = standing();
+  whole.run(400);
+  EXPECT_EQ(whole.state.phase, MissionPhase::kDone);
+  EXPECT_EQ(whole.state.early_end, EarlyEnd::kNone);
+  EXPECT_STREQ(name_of(EarlyEnd::kNotDisarming), "the autopilot did not disarm");
 }
 
 }  // namespace

@@ -92,6 +92,43 @@ TEST(PeriodicGrid, NoDriftAfterAYearOfTicks) {
   EXPECT_EQ(grid.due(kYear), kStart + static_cast<DurationNs>(kYear) * kPeriod);
 }
 
+TEST(PeriodicGrid, CatchUpServesAStallOf130MillisecondsInTurnAndSkipsNone) {
+  const auto releases = run_with_stall(PeriodicGrid(kStart, kPeriod, OverrunPolicy::kCatchUp));
+  for (std::size_t i = 0; i < releases.size(); ++i) {
+    EXPECT_EQ(releases[i].index, i);
+    EXPECT_EQ(releases[i].skipped, 0u);
+    EXPECT_EQ(releases[i].due_at_ns, kStart + static_cast<DurationNs>(i) * kPeriod);
+  }
+}
+
+TEST(PeriodicGrid, CatchUpServesTheYoungestOfALongStallAndSkipsTheRest) {
+  PeriodicGrid grid(kStart, kPeriod, OverrunPolicy::kCatchUp);
+  grid.next(kStart);
+  const TimeNs after = kStart + 10 * kPeriod + kMillisecond;  // releases 1 ... 10 are overdue
+  EXPECT_EQ(grid.next(after).skipped, 10 - PeriodicGrid::kCatchUpBurst);
+  for (std::uint64_t k = 8; k <= 10; ++k) EXPECT_EQ(grid.next(after).index, k);
+  EXPECT_EQ(grid.next(after).index, 11u);
+}
+
+TEST(PeriodicGrid, CatchUpOfAThreadThatIsAlwaysLateIsBounded) {
+  PeriodicGrid grid(kStart, kPeriod, OverrunPolicy::kCatchUp);
+  TimeNs now_ns = kStart;
+  std::uint64_t late_in_a_row = 0, skipped = 0;
+  for (int i = 0; i < 100; ++i) {
+    const Release r = grid.next(now_ns);
+    late_in_a_row = r.due_at_ns < now_ns ? late_in_a_row + 1 : 0;
+    EXPECT_LE(late_in_a_row, PeriodicGrid::kCatchUpBurst);
+    skipped += r.skipped;
+    EXPECT_EQ(r.index, static_cast<std::uint64_t>(i) + skipped);
+    now_ns = std::max(now_ns, r.due_at_ns) + 3 * kPeriod / 2;  // every release takes one and a half periods
+  }
+  EXPECT_GT(skipped, 0u);
+}
+
+TEST(PeriodicGrid, StopKeepsTheGridOfSkip) {
+  EXPECT_TRUE(keeps_the_grid(run_with_stall(PeriodicGrid(kStart, kPeriod, OverrunPolicy::kStop))));
+}
+
 TEST(WaitNext, LatencyIsCountedFromTheIntendedRelease) {
   const TimeNs start = now() + 2 * kMillisecond;
   PeriodicGrid grid(start, kMillisecond);

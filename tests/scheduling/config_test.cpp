@@ -6,6 +6,9 @@
 #include <unistd.h>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
+
+#include "scheduling/default_config.h"
 
 namespace wasp::scheduling {
 namespace {
@@ -42,6 +45,45 @@ TEST_F(ConfigTest, ShippedDefaultsLoadAndMatchTheBuiltInOnes) {
   EXPECT_FLOAT_EQ(file.control.altitude_hold.mass_kg, built_in.control.altitude_hold.mass_kg);
   EXPECT_EQ(file.control_thread.priority, built_in.control_thread.priority);
   EXPECT_EQ(file.control.link_age_limit_ns, built_in.control.link_age_limit_ns);
+  for (std::size_t i = 0; i < kNames.size(); ++i) {
+    EXPECT_EQ(file.control.arbiter.rows[i].height_rank, built_in.control.arbiter.rows[i].height_rank);
+    EXPECT_EQ(file.behaviours[i].priority, built_in.behaviours[i].priority);
+    TomlTable file_params = file.behaviour_params[i], built_in_params = built_in.behaviour_params[i];
+    double a = -1, b = -2;
+    file_params.number("edges_per_m", a, 0, 1000);
+    built_in_params.number("edges_per_m", b, 0, 1000);
+    if (kNames[i] == "edge_altitude") {
+      EXPECT_EQ(a, b);
+    }
+  }
+  EXPECT_EQ(built_in.control.arbiter.rows[0].height_rank, 0);  // without it nobody would say the height
+}
+
+TEST_F(ConfigTest, TheBuiltInTextIsTheShippedFile) {
+  std::ifstream file(WASP_SOURCE_DIR "/config/wasp.toml");
+  const std::string text{std::istreambuf_iterator<char>(file), {}};
+  EXPECT_EQ(text, kDefaultConfig);
+}
+
+TEST_F(ConfigTest, APartialFileKeepsTheHeightRanks) {
+  const Config c = load_config({write("[mission]\npatience_s = 3.0\n")}, kNames);
+  EXPECT_EQ(c.control.arbiter.rows[0].height_rank, 0);
+  EXPECT_EQ(c.control.arbiter.rows[1].height_rank, -1);
+  EXPECT_EQ(c.control.mission.leg_count, 2);
+}
+
+TEST_F(ConfigTest, PoliciesAreReadWhereTheyMakeSense) {
+  const Config c = load_config({write("[run]\nadmission = \"warn\"\n[threads.control]\noverrun = \"catch_up\"\n"
+                                      "[threads.camera]\noverrun = \"stop\"\n"
+                                      "[behaviour.edge_altitude]\nframes = \"in_order\"\n")},
+                               kNames);
+  EXPECT_EQ(c.admission, AdmissionMode::kWarn);
+  EXPECT_EQ(c.control_thread.overrun, rt::OverrunPolicy::kCatchUp);
+  EXPECT_EQ(c.camera_thread.overrun, rt::OverrunPolicy::kStop);
+  EXPECT_FALSE(c.behaviours[0].frames_in_order);
+  EXPECT_TRUE(c.behaviours[1].frames_in_order);
+  EXPECT_NE(error_of("[threads.link]\noverrun = \"skip\"\n").find("overrun"), std::string::npos);
+  EXPECT_NE(error_of("[threads.control]\noverrun = \"hurry\"\n").find("catch_up"), std::string::npos);
 }
 
 TEST_F(ConfigTest, LaterFilesOverrideSingleKeys) {

@@ -123,7 +123,8 @@ class ControlBench {
     return false;
   }
   bool wait_until_flying() {
-    return wait_for_command([](const Command& c) { return c.sent != 0 && c.mode == FlightMode::kBehaviour; });
+    return wait_for_command(
+        [](const Command& c) { return c.mode == FlightMode::kBehaviour && c.q_ned_body[2] > 0.04f; });
   }
   bool wait_for_tick(std::uint64_t tick) {
     return wait_for_command([tick](const Command& c) { return c.tick >= tick; });
