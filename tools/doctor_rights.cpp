@@ -15,7 +15,7 @@
 
 #include "rt/process.h"
 #include "rt/thread.h"
-#include "rt/thread_faults.h"
+#include "rt/thread_usage.h"
 #include "tools/doctor_checks.h"
 #include "tools/program_paths.h"
 
@@ -82,10 +82,10 @@ LockOutcome lock_in_child(int heap_mib) {
     outcome.error = why.empty() ? 0 : (errno != 0 ? errno : 1);
     fmt::format_to_n(outcome.why.data(), outcome.why.size() - 1, "{}", why);
     outcome.locked_kib = locked_kib();
-    const auto before = rt::thread_faults();
+    const auto before = rt::thread_usage();
     auto* heap = static_cast<volatile char*>(std::malloc(std::size_t{16} << 20));
     for (std::size_t i = 0; heap != nullptr && i < std::size_t{16} << 20; i += 4096) heap[i] = 1;
-    outcome.faults = rt::thread_faults().minor - before.minor;
+    outcome.faults = rt::thread_usage().minor_faults - before.minor_faults;
     const bool told = write(ends[1], &outcome, sizeof outcome) == sizeof outcome;
     _exit(told ? 0 : 1);
   }

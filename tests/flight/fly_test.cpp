@@ -155,13 +155,34 @@ TEST(Fly, InterruptLandsInOrderAndStillWritesTheReport) {
     const fs::path commands = out.path / name / "log/commands.csv";
     ASSERT_TRUE(eventually([&] { return read_text(commands).find(",behaviour,") != std::string::npos; }));
     program.signal(SIGINT);
-    program.wait();
+    const int code = program.wait();
     ASSERT_TRUE(fs::exists(out.path / name / "report.html"));
     const auto document = nlohmann::json::parse(read_text(out.path / name / "run.json"));
     EXPECT_NE(document["exit_reason"].get<std::string>().find("interrupted"), std::string::npos);
-    landed = read_text(out.path / name / "log/flight.txt").find("mission flown to its end") != std::string::npos;
+    landed = read_text(out.path / name / "log/flight.txt").find("mission stopped early, in order") != std::string::npos;
+    EXPECT_NE(code, 0);  // it was not flown to its end: no success, but
+    if (landed) {
+      EXPECT_TRUE(code == 4 || code == 1) << code;  // 4: nothing failed; 1: this host missed deadlines
+    }
   }
   EXPECT_TRUE(landed);
+}
+
+TEST(Fly, AReplayThatNoBehaviourEverCommandsIsNoSuccess) {
+  TemporaryFolder out;
+  const fs::path folder = out.path / "black";
+  fs::create_directories(folder / "depth");
+  std::vector<std::uint16_t> nothing(640 * 480, 0);
+  for (int i = 0; i < 45; ++i) {
+    const std::string name = "depth/" + std::to_string(i) + ".png";
+    drivers::save_png(folder / name, DepthView{nothing.data(), 640, 480, 640});
+    std::ofstream(folder / "depth.txt", std::ios::app) << static_cast<double>(i) / 30.0 << " " << name << "\n";
+  }
+  const std::string name = unique("black");
+  const auto [text, code] = run_shell(fly(out, name, "--replay " + folder.string()));
+  EXPECT_NE(code, 0) << text;
+  const std::string log = read_text(out.path / name / "log/flight.txt");
+  EXPECT_NE(log.find("no behaviour ever commanded"), std::string::npos) << log << text;
 }
 
 TEST(Fly, RealTimeThreadsAllocateNothingAndKeepToTheirSystemCalls) {
@@ -282,6 +303,42 @@ TEST(FlyRefuses, ToArmWithoutRealTimeUnlessTheConfigurationAllowsIt) {
   expect_refusal(
       kWasp + " flight --no-rt --instance " + instance + " --config " + (out.path / "c.toml").string() + " 2>&1",
       "enforce_real_time");
+  shm::Region::remove(shm::flight_region(instance));
+}
+
+TEST(Plan, SaysWhetherTheTableIsSchedulableAndWhyNot) {
+  TemporaryFolder out;
+  const auto [good, good_code] = run_shell(kWasp + " plan 2>&1");
+  EXPECT_EQ(good_code, 0) << good;
+  EXPECT_NE(good.find("schedulable"), std::string::npos);
+  EXPECT_NE(good.find("####"), std::string::npos);  // the picture
+  std::ofstream(out.path / "c.toml") << "[behaviour.edge_altitude]\nbudget_us = 60000\n";
+  const auto [json, code] = run_shell(kWasp + " plan --json --config " + (out.path / "c.toml").string());
+  EXPECT_EQ(code, 1);
+  const auto document = nlohmann::json::parse(json);
+  EXPECT_FALSE(document["schedulable"].get<bool>());
+  EXPECT_EQ(document["reasons"].size(), 1u) << json;
+  expect_refusal(kWasp + " plan --config /nowhere.toml 2>&1", "/nowhere.toml");
+  expect_refusal(kWasp + " plan --measured " + (out.path / "c.toml").string() + " 2>&1", "c.toml");
+}
+
+TEST(FlyRefuses, ToArmATableThatIsNotSchedulableUnlessTheConfigurationOnlyWarns) {
+  if (run_shell(kWasp + " flight --check-rights").second != 0) GTEST_SKIP() << "real time is not granted here";
+  TemporaryFolder out;
+  const std::string instance = unique("admission");
+  const PseudoTerminal line(out.path / "tty");
+  const CameraOfNothing camera(instance);
+  const auto command = [&](const std::string& mode) {
+    write_flight_config(out.path / "c.toml", out.path / "tty", true);
+    std::ofstream(out.path / "d.toml") << "[run]\nadmission = \"" << mode
+                                       << "\"\n[behaviour.edge_altitude]\nbudget_us = 60000\n";
+    return kWasp + " flight --instance " + instance + " --config " + (out.path / "c.toml").string() + " --config " +
+           (out.path / "d.toml").string() + " 2>&1";
+  };
+  expect_refusal(command("enforce"), "refusing to arm ([run] admission = \"enforce\")");
+  const auto [text, code] = run_shell(command("warn"));
+  EXPECT_NE(text.find("not schedulable"), std::string::npos) << text;
+  EXPECT_NE(text.find("armed for real time"), std::string::npos) << text;
   shm::Region::remove(shm::flight_region(instance));
 }
 
