@@ -12,6 +12,7 @@
 #include "rt/thread.h"
 #include "scheduling/arming.h"
 #include "scheduling/control_loop.h"
+#include "scheduling/flight_end.h"
 #include "scheduling/flight_options.h"
 #include "scheduling/flight_regions.h"
 #include "scheduling/link_loop.h"
@@ -23,7 +24,6 @@ namespace wasp::scheduling {
 namespace {
 
 constexpr double kReplayTail_s = 0.3;  // the last frames' cues reach a command before the replay ends
-constexpr int kEndedShort = 4;         // exit code: in order, but short of its purpose
 
 void log(const std::string& text) { std::fprintf(stderr, "%10.3f  %s\n", to_seconds(rt::now()), text.c_str()); }
 
@@ -87,7 +87,8 @@ class Flight {
     flight_files_.keep = camera_files_.keep = true;  // the recorder drains them; the launcher removes them
     log(real_time_ ? "armed for real time" : "running, NOT REAL TIME");
     supervise(signals);
-    return conclude();
+    control_.status->finished = 1;
+    return conclude_flight({*control_.status, control_.overrun_stop, recording_problems_ > 0, replay_.get()}, log);
   }
 
  private:
@@ -116,8 +117,8 @@ class Flight {
                                              add_watch(config_.camera_thread), config_.camera_thread.overrun);
   }
 
-  ThreadWatch& add_watch(const ThreadRow& row) {
-    return board_.add({row.name, rt::nearest_usable_core(row.core), row.priority, row.budget_ns});
+  ThreadWatch& add_watch(const ThreadRow& row, bool behaviour = false) {
+    return board_.add({row.name, rt::nearest_usable_core(row.core), row.priority, row.budget_ns, behaviour});
   }
 
   MeasuredCosts measured_costs() const {
@@ -144,7 +145,7 @@ class Flight {
       w.budget_ns = config_.behaviours[i].budget_ns;
       w.frames_in_order = config_.behaviours[i].frames_in_order;
       w.stages = &stages_;
-      w.watch = &add_watch(config_.behaviours[i]);
+      w.watch = &add_watch(config_.behaviours[i], true);
       control.behaviour_watches.push_back(w.watch);
       if (replay_) {
         w.attitude_from_link = false;
@@ -212,41 +213,6 @@ class Flight {
     drain_events();
     if (const std::uint64_t lost = control_events_.dropped() + link_events_.dropped(); lost > 0)
       log(std::to_string(lost) + " events were lost: their queue was full");
-  }
-
-  /// What the counters say that a user must hear.
-  void say_counts(const RunStatus& status) {
-    const auto say = [](std::uint64_t n, const std::string& what) {
-      if (n > 0) log(std::to_string(n) + " " + what);
-    };
-    if (replay_) {
-      say(replay_->held_back(), "times the replay held the camera back for a slow reader");
-      say(replay_->dropped(), "frames of the recording were dropped as late ([threads.camera] overrun)");
-      say(replay_->decode_errors(), "frames of the recording could not be decoded");
-    }
-    say(status.skipped, "control releases were skipped");
-    say(status.deadline_misses, "control deadlines were missed");
-    say(status.commands_refused, "commands were refused as too old at the wire");
-    say(status.setpoints_flushed, "times an old setpoint was thrown out of a stalled serial line");
-    log("page faults in real-time threads: " + std::to_string(status.minor_faults) + " minor, " +
-        std::to_string(status.major_faults) + " major");
-  }
-
-  int conclude() {
-    RunStatus& status = *control_.status;
-    say_counts(status);
-    const auto result = static_cast<MissionResult>(status.mission_result.load());
-    const bool idle = result == MissionResult::kFlown && status.behaviour_ticks == 0;
-    log(result == MissionResult::kStoppedEarly ? "mission stopped early, in order"
-        : result != MissionResult::kFlown      ? "mission broken off"
-        : idle                                 ? "mission flown to its end, but no behaviour ever commanded"
-                                               : "mission flown to its end");
-    if (control_.overrun_stop) log("stopped because a thread overran ([threads] overrun = \"stop\")");
-    status.finished = 1;
-    const bool damaged = replay_ && (replay_->decode_errors() > 0 || recording_problems_ > 0);
-    if (damaged) log("the recording is damaged: see above");
-    if (damaged || (result != MissionResult::kFlown && result != MissionResult::kStoppedEarly)) return 1;
-    return idle || result == MissionResult::kStoppedEarly ? kEndedShort : 0;
   }
 
   const BehaviourTable& table_;

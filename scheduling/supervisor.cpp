@@ -12,6 +12,7 @@
 namespace wasp::scheduling {
 namespace {
 
+constexpr const char* kControl = "control";
 constexpr DurationNs kBeforeRelease = 2 * kMillisecond;  // shown of the core's history ahead of the intended release
 
 std::optional<ThreadCounts> between(const std::optional<ThreadCounts>& before, const std::optional<ThreadCounts>& now) {
@@ -37,14 +38,11 @@ Supervisor::Supervisor(WatchBoard& board, RunStatus& status, SupervisorOptions o
       log_(std::move(log)),
       folder_(options_.incident_dir, options_.incidents) {
   for (auto& watch : board.threads) {
-    const bool control = watch.name == "control";
-    const bool behaviour = !control && watch.name != "link" && watch.name != "camera";
-    if (control) core_ = watch.core;
-    subjects_.push_back({&watch, behaviour, {}, {}, 0});
+    if (watch.name == kControl) core_ = watch.core;
+    subjects_.push_back({&watch});
   }
   // Control first: its misses have the first claim on the files.
-  std::stable_partition(subjects_.begin(), subjects_.end(),
-                        [](const Subject& s) { return s.watch->name == "control"; });
+  std::stable_partition(subjects_.begin(), subjects_.end(), [](const Subject& s) { return s.watch->name == kControl; });
   if (!folder_.has_room()) {
     hush();
   } else if (options_.trace_switches) {
@@ -57,10 +55,10 @@ Supervisor::Supervisor(WatchBoard& board, RunStatus& status, SupervisorOptions o
 
 void Supervisor::look() {
   count();
-  if (board_.frozen.load(std::memory_order_acquire) != 0) {
-    report();
-    board_.frozen.store(0, std::memory_order_relaxed);
-  }
+  bool missed = false;
+  for (auto& s : subjects_) missed = take_misses(s) || missed;
+  if (missed) report();
+  board_.frozen.store(0, std::memory_order_relaxed);  // a miss since then is taken at the next look, unfrozen
   for (auto& s : subjects_) demote_if_runaway(s);
 }
 
@@ -79,36 +77,33 @@ void Supervisor::count() {
   core_before_ = core_now;
 }
 
+/// The first miss since the last look, and how many others; false if there is none.
+bool Supervisor::take_misses(Subject& s) {
+  s.more = s.watch->misses_unreported.exchange(0);
+  s.missed = s.watch->misses.pop(s.miss);
+  for (Miss other; s.missed && s.watch->misses.pop(other);) ++s.more;
+  return s.missed;
+}
+
 /// A file for the first miss of each thread that has one; those that follow soon are counted with it.
 void Supervisor::report() {
   if (trace_ && trace_->available()) kernel_events_ = trace_->take();
   for (auto& s : subjects_) {
-    Miss first;
-    std::uint64_t more = 0;
-    if (!take_first(s, first, more)) continue;
-    if (s.incident_at_ns != kNever && first.due_at_ns - s.incident_at_ns < kSameIncident) {
-      s.followed += more + 1;
+    if (!s.missed) continue;
+    if (s.incident_at_ns != kNever && s.miss.due_at_ns - s.incident_at_ns < kSameIncident) {
+      s.followed += s.more + 1;
       continue;
     }
-    if (folder_.has_room()) write(s, first, more);
-    if (s.behaviour) s.watch->quiet.store(1);  // one file each: they must not take the room of control
+    if (folder_.has_room()) write(s);
+    if (s.watch->behaviour) s.watch->quiet.store(1);  // one file each: they must not take the room of control
   }
 }
 
-bool Supervisor::take_first(Subject& subject, Miss& first, std::uint64_t& more) {
-  more = subject.watch->misses_unreported.exchange(0);
-  if (!subject.watch->misses.pop(first)) return false;
-  for (Miss other; subject.watch->misses.pop(other);) ++more;
-  return true;
-}
-
-void Supervisor::write(Subject& subject, const Miss& miss, std::uint64_t more) {
-  Incident incident = gather(subject, miss);
-  incident.more = more;
-  if (subject.followed > 0)
-    log_(fmt::format("{}: {} more misses followed the last incident", incident.thread, subject.followed));
-  subject.followed = 0;
-  subject.incident_at_ns = std::max({miss.released_at_ns, miss.computed_at_ns, miss.written_at_ns});
+void Supervisor::write(Subject& s) {
+  Incident incident = gather(s);
+  if (s.followed > 0) log_(fmt::format("{}: {} more misses followed the last incident", incident.thread, s.followed));
+  s.followed = 0;
+  s.incident_at_ns = std::max({s.miss.released_at_ns, s.miss.computed_at_ns, s.miss.written_at_ns});
   status_.incidents.fetch_add(1, std::memory_order_relaxed);
   log_(fmt::format("incident {}: {}; {}", incident.number, incident_headline(incident), folder_.write(incident)));
   if (folder_.has_room()) return;
@@ -119,8 +114,10 @@ void Supervisor::write(Subject& subject, const Miss& miss, std::uint64_t more) {
   hush();
 }
 
-Incident Supervisor::gather(const Subject& subject, const Miss& miss) const {
+Incident Supervisor::gather(const Subject& subject) const {
+  const Miss& miss = subject.miss;
   Incident i;
+  i.more = subject.more;
   i.number = folder_.next_number();
   i.limit = folder_.limit();
   i.instance = options_.instance;
@@ -159,7 +156,7 @@ void Supervisor::demote_if_runaway(Subject& s) {
   const TimeNs busy_since_ns = w.busy_since_ns.load(std::memory_order_relaxed);
   const bool same_step = busy_since_ns != 0 && busy_since_ns == s.busy_since_ns;
   s.busy_since_ns = busy_since_ns;
-  if (!options_.real_time || options_.demote_after == 0 || !s.behaviour || w.demoted.load() != 0) return;
+  if (!options_.real_time || options_.demote_after == 0 || !w.behaviour || w.demoted.load() != 0) return;
   const auto limit = static_cast<std::uint32_t>(options_.demote_after);
   const bool endless = same_step && looked_at_ns_ - busy_since_ns > w.budget_ns * options_.demote_after &&
                        (!s.within || s.within->ran_ns > window_ns_ / 2);

@@ -41,19 +41,22 @@ class Supervisor {
   void look();
 
  private:
+  /// A thread under watch.
   struct Subject {
     ThreadWatch* watch = nullptr;
-    bool behaviour = false;
-    std::optional<ThreadCounts> before, within;  ///< at the last look; since then
-    TimeNs busy_since_ns = 0;                    ///< at the last look
-    TimeNs incident_at_ns = kNever;              ///< of its last file
-    std::uint64_t followed = 0;                  ///< misses counted with that file
+    std::optional<ThreadCounts> before = {}, within = {};  ///< at the last look; since then
+    TimeNs busy_since_ns = 0;                              ///< at the last look
+    bool missed = false;
+    Miss miss = {};                  ///< the first one since the last look
+    std::uint64_t more = 0;          ///< after it, since the last look
+    TimeNs incident_at_ns = kNever;  ///< of its last file
+    std::uint64_t followed = 0;      ///< misses that belong to that file
   };
   void count();
+  static bool take_misses(Subject& subject);
   void report();
-  bool take_first(Subject& subject, Miss& first, std::uint64_t& more);
-  void write(Subject& subject, const Miss& miss, std::uint64_t more);
-  Incident gather(const Subject& subject, const Miss& miss) const;
+  void write(Subject& subject);
+  [[nodiscard]] Incident gather(const Subject& subject) const;
   void hush();
   void demote_if_runaway(Subject& subject);
 

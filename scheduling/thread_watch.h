@@ -39,6 +39,7 @@ struct WatchedThread {
   std::string name;
   int core = -1, priority = 0;
   DurationNs budget_ns = 0;
+  bool behaviour = false;  ///< may be demoted
 };
 
 /// One a real-time thread; made before arming.
@@ -49,12 +50,14 @@ class ThreadWatch {
         core(row.core),
         priority(row.priority),
         budget_ns(row.budget_ns),
+        behaviour(row.behaviour),
         trace(frozen),
         frozen_(frozen) {}
 
   const std::string name;
   const int core, priority;
   const DurationNs budget_ns;
+  const bool behaviour;
   std::atomic<int> tid{0};  ///< 0 until the thread runs
   rt::TraceRing trace;
   rt::SpscQueue<Miss, 16> misses;

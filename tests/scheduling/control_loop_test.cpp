@@ -155,12 +155,16 @@ TEST(SetpointLine, AStalledLineIsFlushedSoThatNoOldSetpointGoesOutLater) {
   setpoint.assign(51, 255);
   EXPECT_TRUE(setpoints.send(setpoint, setpoint.size()).setpoint_whole);
   std::vector<std::uint8_t> arrived;
-  for (int i = 0; i < 1000 && arrived.size() < setpoint.size(); ++i) {
+  for (int i = 0; i < 60'000 && (arrived.empty() || arrived.back() != 255); ++i) {
     const auto more = line.read();
     arrived.insert(arrived.end(), more.begin(), more.end());
     rt::sleep_until(rt::now() + kMillisecond);
   }
-  EXPECT_EQ(arrived, setpoint);  // the newest, and nothing of the 300 that waited before it
+  ASSERT_GE(arrived.size(), setpoint.size());
+  EXPECT_TRUE(std::equal(setpoint.rbegin(), setpoint.rend(), arrived.rbegin()));
+  // What stood in the line is gone, but for the 4 KiB that the kernel had already handed to the reader's end.
+  EXPECT_LE(arrived.size(), 4096 + setpoint.size());
+  EXPECT_GT(static_cast<std::size_t>(written) * setpoint.size(), 3 * arrived.size());
 }
 
 }  // namespace

@@ -87,7 +87,7 @@ class StarvationTest : public ::testing::Test {
     const int core = rt::nearest_usable_core(1);
     ControlBench bench(
         {.control_thread = {.name = "control", .policy = rt::Policy::kFifo, .priority = 80, .core = core}});
-    ThreadWatch& watch = bench.board.add({"spinner", core, priority, Spinner::kBudgetNs});
+    ThreadWatch& watch = bench.board.add({"spinner", core, priority, Spinner::kBudgetNs, true});
     SupervisorOptions options;
     options.incidents = 0;
     Supervisor supervisor(bench.board, bench.status(), options, [this](const std::string& l) { log_ += l + "\n"; });

@@ -147,7 +147,7 @@ TEST_F(SupervisorTest, MissesThatFollowSoonBelongToTheSameIncident) {
 TEST_F(SupervisorTest, ABehaviourGetsOneFileAndCannotUseUpTheRoomOfControl) {
   options_.incidents = 2;
   WatchBoard board;
-  ThreadWatch& behaviour = board.add({"edge_altitude", 0, 40, kMillisecond});
+  ThreadWatch& behaviour = board.add({"edge_altitude", 0, 40, kMillisecond, true});
   ThreadWatch& control = board.add({"control", 0, 80, kMillisecond});
   Supervisor supervisor(board, status_, options_, logger());
   for (int i = 0; i < 5; ++i) {
