@@ -54,6 +54,9 @@ bool parse_line(std::string_view line, KernelEvent& e) {
     const auto arrow = line.rfind("==> ");
     if (arrow == std::string_view::npos || !parse_head(line, at, e)) return false;
     const std::string_view next = line.substr(arrow);
+    const auto left = line.rfind(" prev_prio=", arrow);
+    if (left == std::string_view::npos || !number_after(line.substr(left), " prev_prio=", e.left_priority))
+      return false;
     e.task = between(next, "next_comm=", " next_pid=");
     return number_after(next, "next_pid=", e.pid) && number_after(next, "next_prio=", e.priority);
   }
@@ -115,14 +118,14 @@ std::vector<KernelEvent> parse_trace(std::string_view text) {
 std::vector<CoreShare> shares_of(const std::vector<KernelEvent>& events, int core, TimeNs from_ns, TimeNs to_ns) {
   std::map<std::pair<std::string, int>, CoreShare> shares;
   const KernelEvent* running = nullptr;
-  const auto give = [&](TimeNs until_ns) {
+  const auto give = [&](TimeNs until_ns, int priority) {
     if (running == nullptr) return;
     const DurationNs ran_ns = std::min(until_ns, to_ns) - std::max(running->at_ns, from_ns);
     if (ran_ns <= 0) return;
     CoreShare& s = shares[{running->task, running->pid}];
     s.name = running->task;
     s.pid = running->pid;
-    s.priority = running->priority;
+    s.priority = priority;
     s.ran_ns += ran_ns;
   };
   for (const auto& e : events) {
@@ -134,11 +137,11 @@ std::vector<CoreShare> shares_of(const std::vector<KernelEvent>& events, int cor
       s.pid = -1;
       ++s.interrupts;
     } else {
-      give(e.at_ns);
+      give(e.at_ns, e.left_priority);
       running = &e;
     }
   }
-  give(to_ns);
+  if (running != nullptr) give(to_ns, running->priority);
   std::vector<CoreShare> list;
   for (auto& [key, share] : shares) list.push_back(share);
   std::stable_sort(list.begin(), list.end(), [](const auto& a, const auto& b) {

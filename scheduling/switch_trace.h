@@ -18,7 +18,8 @@ struct KernelEvent {
   bool interrupt = false;
   std::string task;
   int pid = 0;
-  int priority = 0;  ///< the kernel's: 99 - SCHED_FIFO priority; 100 and more: not real time
+  int priority = 0;       ///< the kernel's: 99 - SCHED_FIFO priority; 100 and more: not real time
+  int left_priority = 0;  ///< of what ran until now, as it left: it may have changed while it ran
 };
 
 /// Events of the text of a tracefs `trace` file, in its order; lines of other kinds are passed over.

@@ -26,7 +26,7 @@ constexpr const char* kText = R"(# tracer: nop
            a b [c]-77    [001] ..s1.   100.000210: softirq_entry: vec=1 [action=TIMER]
            a b [c]-77    [000] d..2.   100.000300: sched_switch: prev_comm=x prev_pid=5 prev_prio=120 prev_state=S ==> next_comm=other core next_pid=6 next_prio=120
 CPU:1 [LOST 12 EVENTS]
-           a b [c]-77    [001] d..2.   100.001100: sched_switch: prev_comm=a b [c] prev_pid=77 prev_prio=49 prev_state=R+ ==> next_comm=control next_pid=12 next_prio=19
+           a b [c]-77    [001] d..2.   100.001100: sched_switch: prev_comm=a b [c] prev_pid=77 prev_prio=9 prev_state=R+ ==> next_comm=control next_pid=12 next_prio=19
 )";
 
 TEST(SwitchTrace, ReadsSwitchesAndInterruptsAndPassesOverTheRest) {
@@ -51,6 +51,7 @@ TEST(SwitchTrace, SharesAreOfOneCoreAndOneWindow) {
   ASSERT_EQ(shares.size(), 2u);
   EXPECT_EQ(shares[0].name, "a b [c]");
   EXPECT_EQ(shares[0].ran_ns, 500 * kMicrosecond);
+  EXPECT_EQ(shares[0].priority, 9);  // as it left: it made itself more urgent while it ran
   EXPECT_EQ(shares[1].name, "control");
   EXPECT_EQ(shares[1].ran_ns, 200 * kMicrosecond);
   const auto all = shares_of(parse_trace(kText), 1, t0, t0 + kSecond);
