@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cerrno>
 #include <cstring>
 #include <memory>
@@ -26,6 +27,15 @@ template <std::size_t N>
 void copy_note(std::array<char, N>& to, std::string_view from) {
   to.fill(0);
   std::copy_n(from.begin(), std::min(from.size(), N - 1), to.begin());
+}
+
+/// Writes to every page without changing it. MAP_POPULATE and mlock map shared pages for reading only: a processor that
+/// keeps no dirty bit itself (ARMv8.0, e.g. Cortex-A72) would fault on the first write to each, in the real-time thread.
+void touch_for_writing(void* base, std::size_t bytes) {
+  constexpr std::size_t kSmallestPage = 4096;
+  for (std::size_t at = 0; at < bytes; at += kSmallestPage)
+    std::atomic_ref<std::uint32_t>(*reinterpret_cast<std::uint32_t*>(static_cast<std::byte*>(base) + at))
+        .fetch_add(0, std::memory_order_relaxed);
 }
 
 }  // namespace
@@ -52,6 +62,7 @@ Region Region::create(const std::string& name, std::span<const TopicSpec> specs,
   }
   void* base = mmap(nullptr, total, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_POPULATE, file.fd(), 0);
   if (base == MAP_FAILED) fail_errno(name, "mmap");
+  touch_for_writing(base, total);
   region.base_ = static_cast<std::byte*>(base);
   region.bytes_ = total;
   region.inode_ = file.status().st_ino;
@@ -119,6 +130,7 @@ void Region::map_bells(bool create) {
                     ? MAP_FAILED
                     : mmap(nullptr, kBellBytes, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_POPULATE, file.fd(), 0);
   if (bells == MAP_FAILED) fail(name_, "cannot map bells");
+  touch_for_writing(bells, kBellBytes);
   bells_ = static_cast<rt::Bell*>(bells);
 }
 
