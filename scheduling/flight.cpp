@@ -115,6 +115,7 @@ class Flight {
     camera_files_.name = camera_->name();
     replay_ = std::make_unique<ReplayCamera>(std::move(recording), *camera_, from_seconds(seconds), stages_,
                                              add_watch(config_.camera_thread), config_.camera_thread.overrun);
+    if (options_.preload) replay_->preload();
   }
 
   ThreadWatch& add_watch(const ThreadRow& row, bool behaviour = false) {

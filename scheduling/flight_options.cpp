@@ -18,6 +18,7 @@ std::optional<int> parse_flight_options(int argc, char** argv, FlightOptions& o)
       ->check(CLI::ExistingFile);
   app.add_option("--replay", o.replay, "take frames from this recording");
   app.add_option("--seconds", o.seconds, "length of a replay (0: once through)");
+  app.add_flag("--preload", o.preload, "decode the whole recording into memory before arming")->needs("--replay");
   app.add_option("--measured", o.measured,
                  "admission by this log/stages.json of an earlier flight, not by configured budgets")
       ->check(CLI::ExistingFile);

@@ -11,6 +11,7 @@ struct FlightOptions {
   std::string instance = "wasp";
   std::vector<std::string> configs;
   std::string replay;
+  bool preload = false;  ///< decode the whole recording before arming
   double seconds = 0;
   std::string measured;
   bool no_rt = false;

@@ -59,7 +59,8 @@ std::atomic<std::uint64_t>* ReplayCamera::add_reader(bool depth) {
   return &readers_.back()->done;
 }
 
-bool ReplayCamera::decode_one(std::size_t index, DurationNs offset_ns, std::uint32_t sequence, DecodedFrame& frame) {
+/// Pixels of one entry into `frame`; false, counted, if they cannot be decoded.
+bool ReplayCamera::load(std::size_t index, DecodedFrame& frame) {
   const auto& entry = recording_.entries()[index];
   try {
     frame.has_depth = entry.has_depth();
@@ -69,6 +70,26 @@ bool ReplayCamera::decode_one(std::size_t index, DurationNs offset_ns, std::uint
   } catch (const std::exception&) {
     decode_errors_.fetch_add(1);
     return false;
+  }
+  return true;
+}
+
+void ReplayCamera::preload() {
+  std::vector<DecodedFrame> frames(recording_.entries().size());
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    frames[i].depth_mm.resize(recording_.depth_size().pixels());
+    frames[i].gray.resize(recording_.gray_size().pixels());
+    if (!load(i, frames[i])) frames[i].has_depth = frames[i].has_gray = false;
+  }
+  preloaded_ = std::move(frames);
+}
+
+bool ReplayCamera::decode_one(std::size_t index, DurationNs offset_ns, std::uint32_t sequence, DecodedFrame& frame) {
+  if (preloaded_.empty()) {
+    if (!load(index, frame)) return false;
+  } else {
+    frame = preloaded_[index];  // of the same size: copied in place
+    if (!frame.has_depth && !frame.has_gray) return false;
   }
   frame.offset_ns = offset_ns;
   frame.sequence = sequence;

@@ -39,6 +39,9 @@ class ReplayCamera {
   /// A behaviour that must not lose frames: number of its stream's newest frame it has finished with.
   std::atomic<std::uint64_t>* add_reader(bool depth);
 
+  /// Decodes every frame once, before arming, and keeps it: for processors too slow to decode at the frame rate.
+  void preload();
+
   /// Decodes ahead until the stop flag or the end. Ordinary thread.
   void decode(LoopControl& control);
   /// Publishes until the stop flag or the end. Real-time loop.
@@ -55,6 +58,7 @@ class ReplayCamera {
     bool depth = false;
     std::atomic<std::uint64_t> done{0};
   };
+  bool load(std::size_t index, DecodedFrame& frame);
   bool decode_one(std::size_t index, DurationNs offset_ns, std::uint32_t sequence, DecodedFrame& frame);
   void publish_all(RealtimeLoop& loop, LoopControl& control) WASP_REALTIME;
   void publish(const DecodedFrame& frame, TimeNs exposed_at_ns) WASP_REALTIME;
@@ -67,6 +71,7 @@ class ReplayCamera {
   DurationNs length_ns_;
   std::unique_ptr<shm::RingWriter> depth_, gray_;
   FramePool pool_;
+  std::vector<DecodedFrame> preloaded_;  ///< by entry; empty without preload()
   std::vector<std::unique_ptr<Reader>> readers_;
   Stage *release_, *compute_;
   ThreadWatch& watch_;
