@@ -39,7 +39,8 @@ constexpr const char* kUsage =
     "  doctor   find out by doing whether this machine can fly real time, and what would change that\n"
     "  eval     run one vision kernel over a folder of recordings\n"
     "  iceoryx  export topics to iceoryx, or import a camera from it\n"
-    "  bench    benchmarks: latency, ipc, vision, micro\n";
+    "  bench    benchmarks: latency, ipc, vision, micro\n"
+    "  rt-guest the flight on a PREEMPT_RT kernel in an emulator, on virtual time\n";
 
 int run_sister(const char* name, char** argv) {
   const std::string program =

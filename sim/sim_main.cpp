@@ -12,7 +12,8 @@
 #include "rt/thread.h"
 #include "shm/region.h"
 #include "shm/topics.h"
-#include "sim/camera_loop.h"
+#include "sim/camera_part.h"
+#include "sim/owned_region.h"
 #include "sim/vehicle_loop.h"
 
 namespace {
@@ -81,54 +82,29 @@ void wait_for_end(const sigset_t& signals, double seconds) {
   }
 }
 
-/// Regions that vanish with the simulator.
-struct Owned {
-  shm::Region region;
-  Owned(const std::string& name, std::span<const shm::TopicSpec> topics)
-      : region(shm::Region::create(name, topics, "simulated")) {}
-  ~Owned() { shm::Region::remove(region.name()); }
-  Owned(const Owned&) = delete;
-  Owned& operator=(const Owned&) = delete;
-};
-
 void run(const Options& options, const sigset_t& signals) {
   const SimConfig config = settings(options);
-  const auto camera = options.no_camera ? nullptr : std::make_unique<SimCamera>(config);
+  std::optional<CameraPart> camera;
+  if (!options.no_camera) camera.emplace(config, options.instance);
   const shm::TopicSpec truth_topic{shm::kTruth, "Truth", shm::TopicKind::kRing, shm::kTruthSlots, sizeof(Truth)};
-  const Owned truth(shm::truth_region(options.instance), {&truth_topic, 1});
-  std::optional<Owned> frames;
-  if (camera)
-    frames.emplace(shm::camera_region(options.instance), CameraLoop::topics(camera->width_px(), camera->height_px()));
+  const OwnedRegion truth(shm::truth_region(options.instance), {&truth_topic, 1});
   Pty pty(options.tty_link);
 
   const TimeNs start_ns = rt::now() + 10 * kMillisecond;
   auto poses = std::make_unique<PoseQueue>();
   VehicleLoop vehicle_loop(config, start_ns, pty, truth.region, *poses);
-  std::optional<CameraLoop> camera_loop;
-  if (camera) camera_loop.emplace(*camera, start_ns, config.camera_rate_hz, frames->region, *poses);
-
   std::atomic<bool> stop{false};
   rt::Thread vehicle_thread = start_vehicle([&] { vehicle_loop.run(stop); });
-  rt::Thread camera_thread;
-  if (camera_loop)
-    camera_thread = rt::Thread({.name = "camera", .core = rt::nearest_usable_core(0)}, [&] { camera_loop->run(stop); });
+  if (camera) camera->start(start_ns, *poses, stop);
   std::printf("wasp-sim: instance %s, serial line %s -> %s\n", options.instance.c_str(), options.tty_link.c_str(),
               pty.slave_path().c_str());
   std::fflush(stdout);
   wait_for_end(signals, options.seconds);
   stop.store(true);
-  if (camera_thread.joinable()) camera_thread.join();
+  if (camera) camera->join();
   vehicle_thread.join();
-
-  std::printf("wasp-sim: %llu late ticks", static_cast<unsigned long long>(vehicle_loop.late_ticks()));
-  if (camera_loop)
-    std::printf(", %llu frames, %llu skipped, rendering p50 %.2f ms, max %.2f ms, announced %.0f us ahead",
-                static_cast<unsigned long long>(camera_loop->frames()),
-                static_cast<unsigned long long>(camera_loop->skipped()),
-                static_cast<double>(camera_loop->render_time().quantile_ns(0.5)) * 1e-6,
-                static_cast<double>(camera_loop->render_time().max_ns()) * 1e-6,
-                static_cast<double>(camera_loop->lead().quantile_ns(0.5)) * 1e-3);
-  std::printf("\n");
+  std::printf("wasp-sim: %llu late ticks%s\n", static_cast<unsigned long long>(vehicle_loop.late_ticks()),
+              camera ? (", " + camera->summary()).c_str() : "");
 }
 
 }  // namespace

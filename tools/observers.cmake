@@ -1,15 +1,11 @@
 # The observers: programs that map the shared memory read-only. Included from tools/CMakeLists.txt.
-find_package(fmt REQUIRED)
-
 # What they share, and what tests/tools links against.
 add_library(wasp_observers STATIC
-  csv_file.cpp csv_rows.cpp csv_table.cpp latency_summary.cpp
-  record_attachment.cpp record_bus_guard.cpp record_files.cpp record_frames.cpp record_image_pool.cpp record_session.cpp
-  top_snapshot.cpp top_text.cpp
+  csv_file.cpp csv_table.cpp
+  record_files.cpp record_frames.cpp record_image_pool.cpp record_session.cpp
   report_data.cpp report_figures.cpp report_histogram.cpp report_page.cpp report_plot.cpp report_series.cpp report_style.cpp)
 target_include_directories(wasp_observers SYSTEM PUBLIC ${EIGEN3_INCLUDE_DIRS})
-target_link_libraries(wasp_observers PUBLIC wasp_options wasp_shm wasp_drivers fmt::fmt)
+target_link_libraries(wasp_observers PUBLIC wasp_live wasp_drivers)
 
 wasp_program(wasp-record SOURCES record_main.cpp DEPENDS wasp_observers)
-wasp_program(wasp-top SOURCES top_main.cpp DEPENDS wasp_observers)
 wasp_program(wasp-report SOURCES report_main.cpp DEPENDS wasp_observers)

@@ -1,0 +1,21 @@
+// A shared memory region that vanishes with the simulator.
+#pragma once
+
+#include <span>
+#include <string>
+
+#include "shm/region.h"
+
+namespace wasp::sim {
+
+struct OwnedRegion {
+  shm::Region region;
+  /// Throws std::runtime_error as Region::create does.
+  OwnedRegion(const std::string& name, std::span<const shm::TopicSpec> topics)
+      : region(shm::Region::create(name, topics, "simulated")) {}
+  ~OwnedRegion() { shm::Region::remove(region.name()); }
+  OwnedRegion(const OwnedRegion&) = delete;
+  OwnedRegion& operator=(const OwnedRegion&) = delete;
+};
+
+}  // namespace wasp::sim

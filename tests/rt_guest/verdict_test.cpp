@@ -1,0 +1,135 @@
+// The judge: a good run passes, and every way a run can be bad makes it fail, doctored one figure at a time.
+#include "tools/rt_guest/verdict.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <functional>
+
+namespace wasp::tools::rt_guest {
+namespace {
+
+using Outcomes = std::map<std::string, JobOutcome>;
+
+nlohmann::json stage(const char* name, std::int64_t max_ns) {
+  return {{"owner", "control"}, {"stage", name}, {"count", 36100}, {"p999_ns", max_ns / 2}, {"max_ns", max_ns}};
+}
+
+JobOutcome flown(std::uint64_t ticks, bool real_time, std::int64_t release_ns) {
+  nlohmann::json figures{{"stages", {stage("wake-up", release_ns), stage("tick to byte", release_ns + 50'000)}},
+                         {"run",
+                          {{"real_time", real_time},
+                           {"preempt_rt", true},
+                           {"ticks", ticks},
+                           {"skipped", 0},
+                           {"deadline_misses", 0},
+                           {"minor_faults", 0},
+                           {"major_faults", 0},
+                           {"mission_result", 1}}}};
+  return {0, std::move(figures), {}};
+}
+
+Outcomes good() {
+  const nlohmann::json rights{
+      {"root", 0}, {"user", 3}, {"user_rights_missing", 2}, {"user_flight", 1}, {"user_flight_refusals", 1}};
+  return {{"rights", {0, rights, {}}},
+          {"quiet", flown(36'030, true, 39'000)},
+          {"stressed", flown(2'430, true, 46'000)},
+          {"not-real-time", flown(230, false, 14'000'000)}};
+}
+
+Plan full_plan() { return plan_boot("arm64", {.quiet = 36'000, .stressed = 2'400, .not_real_time = 200}); }
+
+std::vector<std::string> missed(const Plan& plan, const Outcomes& outcomes) {
+  std::vector<std::string> names;
+  for (const Result& r : judge(plan, outcomes))
+    if (!r.ok) names.push_back(r.name);
+  return names;
+}
+
+TEST(Verdict, AGoodRunMeetsEveryBar) {
+  EXPECT_EQ(missed(full_plan(), good()), std::vector<std::string>{});
+  EXPECT_GE(judge(full_plan(), good()).size(), 20u);
+}
+
+struct Doctored {
+  const char* what;
+  std::function<void(Outcomes&)> doctor;
+  std::string missed;
+};
+
+nlohmann::json& run_of(Outcomes& o, const char* job) { return o.at(job).figures["run"]; }
+nlohmann::json& stage_of(Outcomes& o, const char* job, int index) { return o.at(job).figures["stages"][index]; }
+
+TEST(Verdict, EveryDoctoredFigureIsFoundByName) {
+  const std::vector<Doctored> cases = {
+      {"a release later than 60 us", [](auto& o) { stage_of(o, "quiet", 0)["max_ns"] = 60'001; },
+       "quiet: control release, max"},
+      {"a byte later than 2 ms", [](auto& o) { stage_of(o, "stressed", 1)["max_ns"] = 2'000'001; },
+       "stressed: tick to last byte, max"},
+      {"a missed release", [](auto& o) { run_of(o, "stressed")["skipped"] = 1; }, "stressed: missed releases"},
+      {"a missed deadline", [](auto& o) { run_of(o, "quiet")["deadline_misses"] = 1; }, "quiet: missed deadlines"},
+      {"a page fault", [](auto& o) { run_of(o, "quiet")["minor_faults"] = 1; },
+       "quiet: page faults in real-time threads"},
+      {"too few cycles", [](auto& o) { run_of(o, "quiet")["ticks"] = 35'999; }, "quiet: control cycles"},
+      {"a mission broken off", [](auto& o) { run_of(o, "quiet")["mission_result"] = 2; }, "quiet: flown to its end"},
+      {"a flight that crashed", [](auto& o) { o.at("stressed").exit_code = 139; }, "stressed: flown to its end"},
+      {"not real time after all", [](auto& o) { run_of(o, "quiet")["real_time"] = false; },
+       "quiet: flight says real time on PREEMPT_RT"},
+      {"another kernel", [](auto& o) { run_of(o, "quiet")["preempt_rt"] = false; },
+       "quiet: flight says real time on PREEMPT_RT"},
+      {"a negative control as good as real time", [](auto& o) { stage_of(o, "not-real-time", 0)["max_ns"] = 900'000; },
+       "not-real-time: control release, max"},
+      {"a negative control that hardly ran", [](auto& o) { run_of(o, "not-real-time")["ticks"] = 3; },
+       "not-real-time: control cycles"},
+      {"a flight without figures", [](auto& o) { o.at("quiet").figures = nlohmann::json(); },
+       "quiet: figures handed back"},
+      {"a stage without samples", [](auto& o) { stage_of(o, "quiet", 0)["count"] = 0; }, "quiet: figures handed back"},
+      {"a flight that never came back", [](auto& o) { o.erase("stressed"); }, "stressed: figures handed back"},
+      {"figures that are no JSON",
+       [](auto& o) { o.at("quiet").figures = nlohmann::json::parse("{\"sta", nullptr, false); },
+       "quiet: figures handed back"},
+      {"a user with root's rights", [](auto& o) { o.at("rights").figures["user"] = 0; }, "rights: a user's exit code"},
+      {"root without rights", [](auto& o) { o.at("rights").figures["root"] = 3; }, "rights: root lacks none"},
+  };
+  for (const auto& c : cases) {
+    Outcomes outcomes = good();
+    c.doctor(outcomes);
+    EXPECT_EQ(missed(full_plan(), outcomes), std::vector<std::string>{c.missed}) << c.what;
+  }
+}
+
+TEST(Verdict, NothingAtAllMissesEverything) {
+  for (const Result& r : judge(full_plan(), {})) EXPECT_FALSE(r.ok) << r.name;
+}
+
+TEST(Verdict, TheHostsTimeIsNotJudged) {
+  Outcomes outcomes = good();
+  stage_of(outcomes, "quiet", 0)["max_ns"] = 50'000'000;
+  const Plan plan = plan_boot("amd64", {.quiet = 300});
+  EXPECT_EQ(missed(plan, outcomes), std::vector<std::string>{});
+  run_of(outcomes, "quiet")["preempt_rt"] = false;
+  EXPECT_EQ(missed(plan, outcomes), std::vector<std::string>{"quiet: flight says real time on PREEMPT_RT"});
+}
+
+TEST(Verdict, TheTableShowsEveryFlight) {
+  Outcomes outcomes = good();
+  outcomes.erase("stressed");
+  const std::string text = table(read_rows(full_plan(), outcomes));
+  EXPECT_NE(text.find("36030"), std::string::npos) << text;
+  EXPECT_NE(text.find("no figures"), std::string::npos) << text;
+  EXPECT_NE(text.find("SCHED_OTHER"), std::string::npos) << text;
+}
+
+TEST(Plan, JobsAreLinesTheGuestUnderstands) {
+  const Plan plan = full_plan();
+  ASSERT_EQ(plan.jobs.size(), 4u);
+  EXPECT_EQ(plan.jobs[0].line(), "rights rights");
+  EXPECT_EQ(plan.jobs[1].line(), "flight quiet 1800 rt idle");
+  EXPECT_EQ(plan.jobs[2].line(), "flight stressed 120 rt stress");
+  EXPECT_EQ(plan.jobs[3].line(), "flight not-real-time 10 other stress");
+  EXPECT_EQ(plan.seconds(), 1930);
+}
+
+}  // namespace
+}  // namespace wasp::tools::rt_guest

@@ -1,0 +1,53 @@
+// What one boot of the guest is asked to do, and the bars its figures must meet.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace wasp::tools::rt_guest {
+
+inline constexpr double kControlRate_hz = 20.0;  ///< of config/wasp.toml
+
+enum class JobKind {
+  kFlight,  ///< frames replayed, autopilot simulated
+  kRights,  ///< what root is granted, and what anybody else is refused by name
+};
+
+struct Job {
+  std::string name;
+  JobKind kind = JobKind::kFlight;
+  std::int64_t cycles = 0;  ///< control cycles a flight must reach
+  bool real_time = true;    ///< false: the same binary with --no-rt, SCHED_OTHER
+  bool stressed = false;    ///< beside stress-ng
+
+  /// Virtual time in flight.
+  [[nodiscard]] int seconds() const;
+  /// Its line for jobs.sh.
+  [[nodiscard]] std::string line() const;
+};
+
+struct Bars {
+  double release_us = 60;       ///< intended release -> control thread runs, always
+  double last_byte_ms = 2;      ///< intended release -> the command's last byte, always
+  double not_real_time_ms = 1;  ///< what the negative control must exceed
+};
+
+struct Plan {
+  std::string arch;
+  bool virtual_time = true;  ///< latencies mean something; without it only function is judged
+  std::vector<Job> jobs;
+  Bars bars;
+  [[nodiscard]] int seconds() const;  ///< all jobs' virtual time
+};
+
+/// How many control cycles each flight must reach.
+struct Cycles {
+  std::int64_t quiet = 300, stressed = 200, not_real_time = 100;
+};
+
+/// arm64: rights, the quiet flight, the stressed one, and the negative control: same binary and load without real time.
+/// amd64: rights and the quiet flight; that machine's time is the host's, so nothing is said of latency.
+Plan plan_boot(const std::string& arch, const Cycles& cycles);
+
+}  // namespace wasp::tools::rt_guest
