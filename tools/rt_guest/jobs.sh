@@ -82,7 +82,7 @@ flight() {
   wasp flight $options --replay /wasp/clip --preload --seconds "$seconds" >"$name.log" 2>&1 &
   flight=$!
   stress=
-  wait_until grep -q "mission:" "$name.log" # armed: what comes before is not measured
+  wait_until grep -qs "mission:" "$name.log" # armed: what comes before is not measured
   [ "$load" = stress ] && start_stress
   wait $flight
   code=$?

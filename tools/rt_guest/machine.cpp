@@ -5,6 +5,8 @@
 
 #include <array>
 #include <fstream>
+#include <iterator>
+#include <sstream>
 #include <stdexcept>
 
 #include "rt/clock.h"
@@ -21,6 +23,11 @@ constexpr const char* kKernelWords = "quiet loglevel=1 panic=-1 rdinit=/init";
   std::string text = what + "; its console ended with:";
   for (const auto& line : console.tail()) text += "\n  " + line;
   throw std::runtime_error(text);
+}
+
+std::vector<std::string> split(const std::string& words) {
+  std::istringstream in(words);
+  return {std::istream_iterator<std::string>(in), {}};
 }
 
 /// Hands on what has been written to the file since the last look. True if there was anything.
@@ -40,36 +47,16 @@ bool follow(std::ifstream& file, Console& console) {
 
 std::vector<std::string> machine_arguments(const std::string& arch, const Image& image) {
   const bool arm = arch == "arm64";
-  std::vector<std::string> a;
-  if (arm)
-    a = {find_program("qemu-system-aarch64", "qemu-system-arm"),
-         "-machine",
-         "virt,gic-version=3",
-         "-cpu",
-         "cortex-a72",
-         "-smp",
-         "1",
-         "-accel",
-         "tcg,thread=single,tb-size=256",
-         "-icount",
-         "shift=1,sleep=off"};
-  else
-    a = {find_program("qemu-system-x86_64", "qemu-system-x86"),
-         "-machine",
-         "q35",
-         "-cpu",
-         "max",
-         "-smp",
-         "2",
-         "-accel",
-         "tcg,thread=multi,tb-size=256"};
-  const std::string words =
-      std::string(arm ? "console=ttyAMA0,115200 " : "console=ttyS0,115200 tsc=reliable no_timer_check ") + kKernelWords;
-  for (const std::string& s : std::vector<std::string>{
-           "-m", "1024", "-nodefaults", "-no-reboot", "-display", "none", "-monitor", "none", "-serial", "stdio",
-           "-kernel", image.kernel.string(), "-initrd", image.initrd.string(), "-append", words})
-    a.push_back(s);
-  return a;
+  std::string words =
+      arm ? find_program("qemu-system-aarch64", "qemu-system-arm") + " -machine virt,gic-version=3 -cpu cortex-a72"
+          : find_program("qemu-system-x86_64", "qemu-system-x86") + " -machine q35 -cpu max";
+  words += " -smp 1 -accel tcg,thread=single,tb-size=256 -icount shift=1,sleep=off -m 1024";
+  words += " -nodefaults -no-reboot -display none -monitor none -serial stdio";
+  std::vector<std::string> arguments = split(words);
+  const std::string console = arm ? "console=ttyAMA0,115200 " : "console=ttyS0,115200 tsc=reliable no_timer_check ";
+  arguments.insert(arguments.end(), {"-kernel", image.kernel.string(), "-initrd", image.initrd.string(), "-append",
+                                     console + kKernelWords});
+  return arguments;
 }
 
 Console boot(const std::string& arch, const Image& image, const fs::path& console_file, double patience_s,

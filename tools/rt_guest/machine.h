@@ -1,6 +1,6 @@
-// The emulated machine. arm64 runs on virtual time: one processor at 500 million instructions a second, time standing
-// still whenever the emulator does, so that latencies do not depend on the host. amd64 runs as fast as the host allows
-// and serves functional tests only.
+// The emulated machine, on virtual time: one processor at 500 million instructions a second, time standing still
+// whenever the emulator does, so that latencies do not depend on the host. (Two processors show false latencies of
+// milliseconds on arm64, and hang on amd64.)
 #pragma once
 
 #include <filesystem>

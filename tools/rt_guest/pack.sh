@@ -10,6 +10,7 @@ root=$1 build=$2 clip=$3 config=$4 jobs=$5 initrd=$6
 
 stage=$(mktemp -d)
 trap 'rm -rf --one-file-system "$stage"' EXIT
+chmod 755 "$stage"
 mkdir -p "$stage"/{bin,lib,wasp/bin,wasp/config}
 
 find_library() {

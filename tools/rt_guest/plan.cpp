@@ -19,13 +19,12 @@ int Plan::seconds() const {
 }
 
 Plan plan_boot(const std::string& arch, const Cycles& cycles) {
-  Plan plan{.arch = arch, .virtual_time = arch == "arm64", .jobs = {}, .bars = {}};
-  plan.jobs.push_back({.name = "rights", .kind = JobKind::kRights});
-  plan.jobs.push_back({.name = "quiet", .cycles = cycles.quiet});
-  if (!plan.virtual_time) return plan;
-  plan.jobs.push_back({.name = "stressed", .cycles = cycles.stressed, .stressed = true});
-  plan.jobs.push_back({.name = "not-real-time", .cycles = cycles.not_real_time, .real_time = false, .stressed = true});
-  return plan;
+  return {.arch = arch,
+          .jobs = {{.name = "rights", .kind = JobKind::kRights},
+                   {.name = "quiet", .cycles = cycles.quiet},
+                   {.name = "stressed", .cycles = cycles.stressed, .stressed = true},
+                   {.name = "not-real-time", .cycles = cycles.not_real_time, .real_time = false, .stressed = true}},
+          .bars = {}};
 }
 
 }  // namespace wasp::tools::rt_guest

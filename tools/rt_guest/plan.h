@@ -35,7 +35,6 @@ struct Bars {
 
 struct Plan {
   std::string arch;
-  bool virtual_time = true;  ///< latencies mean something; without it only function is judged
   std::vector<Job> jobs;
   Bars bars;
   [[nodiscard]] int seconds() const;  ///< all jobs' virtual time
@@ -46,8 +45,7 @@ struct Cycles {
   std::int64_t quiet = 300, stressed = 200, not_real_time = 100;
 };
 
-/// arm64: rights, the quiet flight, the stressed one, and the negative control: same binary and load without real time.
-/// amd64: rights and the quiet flight; that machine's time is the host's, so nothing is said of latency.
+/// Rights, the quiet flight, the stressed one, and the negative control: the same binary and load without real time.
 Plan plan_boot(const std::string& arch, const Cycles& cycles);
 
 }  // namespace wasp::tools::rt_guest

@@ -14,7 +14,6 @@ nlohmann::json job_json(const Job& job, const JobOutcome& outcome) {
 nlohmann::json report_json(const Plan& plan, const std::string& kernel_package, const Console& console,
                            const std::vector<Result>& results) {
   nlohmann::json document{{"arch", plan.arch},
-                          {"virtual_time", plan.virtual_time},
                           {"kernel", console.kernel()},
                           {"kernel_package", kernel_package},
                           {"jobs", nlohmann::json::array()},
