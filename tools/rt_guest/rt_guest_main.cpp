@@ -41,7 +41,7 @@ Plan plan_of(const Options& o) {
 
 void print_results(const std::vector<Result>& results) {
   for (const Result& r : results)
-    std::cout << fmt::format("{:<4} {:<52} {:>10.4g} {:<2} {}\n", r.ok ? "ok" : "MISS", r.name, r.value, r.unit,
+    std::cout << fmt::format("{:<4} {:<52} {:>10.6g} {:<2} {}\n", r.ok ? "ok" : "MISS", r.name, r.value, r.unit,
                              "bar " + r.bar);
 }
 
@@ -90,7 +90,7 @@ std::optional<int> parse(int argc, char** argv, Options& o) {
   app.option_defaults()->always_capture_default();
   auto* full = app.add_flag(
       "--full", o.full,
-      "36000 control cycles (30 virtual minutes), 2400 under stress-ng; about 20 minutes on an idle machine");
+      "36000 control cycles (30 virtual minutes), 2400 under stress-ng; 18 minutes of processor time");
   app.add_flag("--short", o.short_form,
                "300 control cycles, 200 under stress-ng, for continuous integration (the default)")
       ->excludes(full);
