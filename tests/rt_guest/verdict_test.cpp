@@ -121,6 +121,7 @@ TEST(Plan, JobsAreLinesTheGuestUnderstands) {
   EXPECT_EQ(plan.jobs[2].line(), "flight stressed 120 rt stress");
   EXPECT_EQ(plan.jobs[3].line(), "flight not-real-time 10 other stress");
   EXPECT_EQ(plan.seconds(), 1930);
+  EXPECT_EQ(plan_boot("amd64", {}).jobs.size(), 2u);
 }
 
 }  // namespace

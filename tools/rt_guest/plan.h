@@ -45,7 +45,8 @@ struct Cycles {
   std::int64_t quiet = 300, stressed = 200, not_real_time = 100;
 };
 
-/// Rights, the quiet flight, the stressed one, and the negative control: the same binary and load without real time.
+/// arm64: rights, the quiet flight, the stressed one, and the negative control: the same binary and load without real
+/// time. amd64: rights and the quiet flight.
 Plan plan_boot(const std::string& arch, const Cycles& cycles);
 
 }  // namespace wasp::tools::rt_guest

@@ -88,9 +88,9 @@ std::optional<int> parse(int argc, char** argv, Options& o) {
       "Exit code 0: all bars met; 1: a bar missed or the guest failed; 2: bad arguments; 77: cannot be had here."};
   app.name("wasp rt-guest");
   app.option_defaults()->always_capture_default();
-  auto* full = app.add_flag(
-      "--full", o.full,
-      "36000 control cycles (30 virtual minutes), 2400 under stress-ng; 18 minutes of processor time");
+  auto* full =
+      app.add_flag("--full", o.full,
+                   "36000 control cycles (30 virtual minutes), 2400 under stress-ng; 18 minutes of processor time");
   app.add_flag("--short", o.short_form,
                "300 control cycles, 200 under stress-ng, for continuous integration (the default)")
       ->excludes(full);
