@@ -12,14 +12,16 @@ sanitize() {
   NINJA_STATUS='[%f/%t, %es] ' cmake --build "$folder" -j 2 --target "$@"
 }
 
-# The flight process from the sanitized build, everything about it from the ordinary one.
+# The flight process from the sanitized build, everything about it from the ordinary one. What counts is that it lived
+# and flew its mission: deadlines missed on a busy host are not the sanitizer's business.
 fly_under_realtime_sanitizer() {
   local folder=$here/build-rtsan/flight
   build wasp-fly wasp-sim wasp-record wasp-report || return
   mkdir -p "$folder"
   ln -sfn "$here/config" "$here/build-rtsan/config"
   cp "$here/build-rtsan/wasp" "$here"/build/wasp-{fly,sim,record,report} "$folder/"
-  "$folder/wasp-fly" --no-rt --seconds 20 --out "$here/build-rtsan/out"
+  "$folder/wasp-fly" --no-rt --seconds 20 --out "$here/build-rtsan/out" | tee "$folder/fly.log" || true
+  grep -q '^ok *flight process exit code' "$folder/fly.log" && grep -q '^ok *mission flown' "$folder/fly.log"
 }
 
 prove() {
