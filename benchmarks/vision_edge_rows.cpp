@@ -34,6 +34,7 @@ std::vector<VisionRow> edge_rows_rows(const VisionData& data) {
   row.floor_us = 13;
   row.inputs = data.names(data.gray);
   row.bound = "fixed trip counts";
+  row.fresh = [&data](int i) { read_through(data.gray[static_cast<std::size_t>(i)].pixels); };
   row.ours = [&data, rows](int i) {
     vision::count_edge_rows({}, data.gray[static_cast<std::size_t>(i)].view(), {}, *rows);
     keep(*rows);
