@@ -10,7 +10,7 @@
 
 namespace wasp::control {
 
-inline constexpr int kMaxBehaviours = 16;
+inline constexpr int kMaxBehaviours = 24;
 
 /// How the arbiter treats one behaviour; row i belongs to Cue::behaviour == i.
 struct ArbiterRow {

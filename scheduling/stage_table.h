@@ -36,7 +36,7 @@ struct Stage {
 
 /// Block topic "stages" (type StageTable) of the flight region. Rows are added before arming and never removed.
 struct StageTable {
-  static constexpr std::size_t kMaxStages = 64;
+  static constexpr std::size_t kMaxStages = 128;
   std::atomic<std::uint32_t> count{0};
   std::array<Stage, kMaxStages> stages;
 
@@ -83,13 +83,13 @@ struct RunStatus {
   std::atomic<std::uint64_t> bad_frames{0};   ///< link frames with a bad checksum
   std::atomic<std::uint64_t> link_reconnects{0};
   std::atomic<std::uint32_t> behaviour_count{0};
-  std::array<std::array<char, 32>, 16> behaviours{};  ///< names by Cue::behaviour index
+  std::array<std::array<char, 32>, 24> behaviours{};  ///< names by Cue::behaviour index
   std::atomic<std::uint32_t> mission_result{0};       ///< MissionResult
   std::atomic<std::uint32_t> incidents{0};            ///< misses of which a file was to be written
   std::atomic<std::uint64_t> commands_refused{0};     ///< too old at the moment they were to go out
   std::atomic<std::uint64_t> setpoints_flushed{0};    ///< times an old setpoint was thrown out of a stalled line
   std::atomic<std::uint64_t> behaviour_ticks{0};      ///< control ticks commanded by behaviours
-  std::array<std::atomic<std::uint32_t>, 16> behaviour_state{};  ///< BehaviourState by Cue::behaviour index
+  std::array<std::atomic<std::uint32_t>, 24> behaviour_state{};  ///< BehaviourState by Cue::behaviour index
 };
 
 }  // namespace wasp::scheduling

@@ -59,11 +59,12 @@ std::string_view cue_columns() {
          "index,"
          "over_budget,attitude_valid,q_w,q_x,q_y,q_z,rate_x_body_radps,rate_y_body_radps,rate_z_body_radps,"
          "validity,has_height,has_heading_rate,has_pitch,avoid,quality,height_m,height_sigma_m,heading_rate_radps,"
-         "pitch_rad,detail_0,detail_1,detail_2,detail_3,detail_4,detail_5,detail_6,detail_7,number,published_at_ns";
+         "pitch_rad,has_velocity,has_climb,velocity_forward_mps,velocity_right_mps,velocity_sigma_mps,climb_mps,climb_1ps,"
+         "accel_valid,accel_x_body_mps2,accel_y_body_mps2,accel_z_body_mps2,detail_0,detail_1,detail_2,detail_3,detail_4,detail_5,detail_6,detail_7,number,published_at_ns";
 }
 std::string_view command_columns() {
   return "exposed_at_ns,due_at_ns,released_at_ns,computed_at_ns,written_at_ns,tick,q_w,q_x,q_y,q_z,yaw_rate_radps,"
-         "thrust,height_setpoint_m,height_m,climb_rate_mps,cue_source,mode,reason,sent,mission_phase,mode_name,"
+         "thrust,height_setpoint_m,height_m,climb_rate_mps,cue_source,mode,reason,sent,mission_phase,velocity_forward_mps,velocity_right_mps,avoid,velocity_held,mode_name,"
          "reason_name,number,published_at_ns";
 }
 std::string_view truth_columns() {
@@ -90,7 +91,9 @@ std::string csv_row(const Cue& c, const RingStamp& stamp, std::string_view behav
   line.add(c.behaviour).add(c.frame_sequence).add(c.step_index).add(c.over_budget).add(c.attitude_valid);
   line.add(c.q_ned_body).add(c.rate_body_radps).add(static_cast<int>(b.validity)).add(b.has_height);
   line.add(b.has_heading_rate).add(b.has_pitch).add(b.avoid).add(b.quality).add(b.height_m).add(b.height_sigma_m);
-  return line.add(b.heading_rate_radps).add(b.pitch_rad).add(b.detail).finish(stamp);
+  line.add(b.heading_rate_radps).add(b.pitch_rad).add(b.has_velocity).add(b.has_climb).add(b.velocity_forward_mps);
+  line.add(b.velocity_right_mps).add(b.velocity_sigma_mps).add(b.climb_mps).add(b.climb_1ps).add(c.accel_valid);
+  return line.add(c.accel_body_mps2).add(b.detail).finish(stamp);
 }
 
 std::string csv_row(const Command& c, const RingStamp& stamp) {
@@ -98,7 +101,8 @@ std::string csv_row(const Command& c, const RingStamp& stamp) {
   line.add(c.exposed_at_ns).add(c.due_at_ns).add(c.released_at_ns).add(c.computed_at_ns).add(c.written_at_ns);
   line.add(c.tick).add(c.q_ned_body).add(c.yaw_rate_radps).add(c.thrust).add(c.height_setpoint_m).add(c.height_m);
   line.add(c.climb_rate_mps).add(c.cue_source).add(static_cast<int>(c.mode)).add(static_cast<int>(c.reason));
-  line.add(c.sent).add(c.mission_phase).add(mode_name(c.mode)).add(reason_name(c.reason));
+  line.add(c.sent).add(c.mission_phase).add(c.velocity_forward_mps).add(c.velocity_right_mps).add(c.avoid);
+  line.add(c.velocity_held).add(mode_name(c.mode)).add(reason_name(c.reason));
   return line.finish(stamp);
 }
 

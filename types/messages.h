@@ -54,12 +54,18 @@ enum class Validity : std::uint8_t { kBlind = 0, kValid = 1 };
 struct CueBody {
   Validity validity = Validity::kBlind;
   std::uint8_t has_height = 0, has_heading_rate = 0, has_pitch = 0, avoid = 0;
-  std::uint8_t reserved[3] = {};
+  std::uint8_t has_velocity = 0, has_climb = 0;
+  std::uint8_t reserved[1] = {};
   float quality = 0;         ///< 0 ... 1
   float height_m = 0;        ///< above the ground, along the world vertical
   float height_sigma_m = 0;  ///< one standard deviation
-  float heading_rate_radps = 0;
-  float pitch_rad = 0;
+  float heading_rate_radps = 0;  ///< wish: clockwise seen from above
+  float pitch_rad = 0;           ///< wish: nose up, so forward is negative
+  /// Measured over ground, along the heading and to its right, level [m/s].
+  float velocity_forward_mps = 0, velocity_right_mps = 0;
+  float velocity_sigma_mps = 0;  ///< one standard deviation of each
+  float climb_mps = 0;           ///< wish: climb at climb_mps + climb_1ps * height
+  float climb_1ps = 0;
   std::array<float, 8> detail{};  ///< behaviour-specific, named in its header; for logs and figures only
 };
 
@@ -75,6 +81,8 @@ struct Cue {
   std::uint32_t attitude_valid = 0;
   std::array<float, 4> q_ned_body{1, 0, 0, 0};  ///< attitude the step was given
   std::array<float, 3> rate_body_radps{};       ///< and its rates
+  std::array<float, 3> accel_body_mps2{};       ///< specific force the step was given
+  std::uint32_t accel_valid = 0;
   std::uint32_t over_budget = 0;
   CueBody body;
 };
@@ -116,13 +124,16 @@ struct Command {
   float height_setpoint_m = 0;
   float height_m = 0;  ///< control's own filtered estimate
   float climb_rate_mps = 0;
+  float velocity_forward_mps = 0, velocity_right_mps = 0;  ///< as used; 0 when nobody measures it
   std::int32_t cue_source = -1;  ///< behaviour index whose height was used, -1 none
   FlightMode mode = FlightMode::kDisarmed;
   ModeReason reason = ModeReason::kNone;
   std::uint8_t sent = 0;
   std::uint8_t mission_phase = 0;
   std::uint8_t refused = 0;  ///< control::Refusal: why the arbiter's own command did not go out
-  std::uint8_t reserved[3] = {};
+  std::uint8_t avoid = 0;    ///< a behaviour raised avoid at this tick
+  std::uint8_t velocity_held = 0;
+  std::uint8_t reserved[1] = {};
 };
 
 /// The simulator's own truth; no flight thread reads it.

@@ -13,15 +13,8 @@
 
 namespace wasp::vision {
 
-/// How pixels become directions. `kFisheye` is the equidistant model of Kannala and Brandt (2006) as OpenCV's fisheye
-/// module has it: r = theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6 + k4 theta^8).
-enum class LensKind : std::uint8_t { kPinhole, kFisheye };
-
-struct Lens {
-  LensKind kind = LensKind::kPinhole;
-  Intrinsics intrinsics;             ///< k1 ... k3 are read for kPinhole only
-  std::array<float, 4> fisheye_k{};  ///< k1 ... k4, read for kFisheye only
-};
+using wasp::Lens;
+using wasp::LensKind;
 
 /// Unit viewing direction of a pixel, camera axes (x right, y down, z forward). False where the model has no inverse.
 /// At most kMaxNewton steps. Realtime-safe: yes.
