@@ -32,8 +32,11 @@ bool FlightObserver::attach() {
     const auto run = tools::read_run(*region);
     if (!run.present || run.behaviours.empty()) return false;
     commands_ = std::make_unique<shm::RingReader>(*region, shm::kCommand, "Command");
-    for (const auto& name : run.behaviours) cue_readers_.emplace_back(*region, shm::cue_topic(name), "Cue");
-    behaviours_ = run.behaviours;
+    for (const auto& name : run.behaviours) {
+      if (!region->has(shm::cue_topic(name))) continue;  // not enabled
+      cue_readers_.emplace_back(*region, shm::cue_topic(name), "Cue");
+      behaviours_.push_back(name);
+    }
     cues_.resize(behaviours_.size());
     region_ = std::move(region);
   } catch (const std::exception&) {

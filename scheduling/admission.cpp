@@ -32,7 +32,11 @@ std::vector<AnalysedThread> table_of(const Config& c, DurationNs frame_period_ns
   threads.push_back(analysed(c.control_thread, c.control_period_ns, c.control_deadline_ns, c));
   threads.push_back(analysed(c.link_thread, c.link_period_ns, c.link_period_ns, c));
   if (with_replay) threads.push_back(analysed(c.camera_thread, frame_period_ns, frame_period_ns, c));
-  for (const auto& b : c.behaviours) threads.push_back(analysed(b, frame_period_ns, frame_period_ns, c));
+  const DurationNs down_period_ns = from_seconds(1.0 / c.camera_down.rate_hz);
+  for (const auto& b : c.behaviours) {
+    const DurationNs period_ns = b.looks_down ? down_period_ns : frame_period_ns;
+    if (b.enabled) threads.push_back(analysed(b, period_ns, period_ns, c));
+  }
   std::stable_sort(threads.begin(), threads.end(),
                    [](const auto& a, const auto& b) { return a.priority > b.priority; });
   return threads;

@@ -31,8 +31,8 @@ struct Plan {
   std::vector<std::string> reasons;  ///< why not, one line a thread
 };
 
-/// `frame_period_ns` is the camera's; `with_replay` adds the replay camera's thread. Cores are those this process may
-/// really use.
+/// Enabled behaviours only. `frame_period_ns` is the front camera's; `with_replay` adds the replay camera's thread.
+/// Cores are those this process may really use.
 Plan make_plan(const Config& config, DurationNs frame_period_ns, bool with_replay, const MeasuredCosts& measured);
 
 /// Table, reasons and a picture of each core from the instant when all its threads are released together.

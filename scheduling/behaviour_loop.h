@@ -1,14 +1,16 @@
-// The adaptor, written once: waits for a frame, calls `step`, publishes the cue, records latency and overruns. A new
-// behaviour is one file pair in vision/ and one row in behaviours.cpp.
+// The adaptor, written once: waits for a frame or a flow field, calls `step`, publishes the cue (and the flow field, if
+// the behaviour makes one), records latency and overruns. A new behaviour is one file pair in vision/ and one row in
+// behaviours.cpp.
 #pragma once
 
 #include <atomic>
+#include <optional>
 
 #include "rt/clock.h"
 #include "scheduling/frame_source.h"
 #include "scheduling/realtime_loop.h"
 #include "scheduling/replay_script.h"
-#include "shm/topics.h"
+#include "scheduling/vehicle_history.h"
 
 namespace wasp::scheduling {
 
@@ -23,7 +25,7 @@ struct BehaviourWiring {
   ThreadWatch* watch = nullptr;             ///< required
   const BehaviourScript* script = nullptr;  ///< replay of a wasp recording: inputs as recorded, frames in order
   std::uint32_t script_ends_at = 0;         ///< first frame sequence of the recording's second lap
-  bool attitude_from_link = true;           ///< false in a replay: the simulated vehicle's attitude is not the camera's
+  bool vehicle_from_link = true;            ///< false in a replay: the simulated vehicle's motion is not the camera's
   std::atomic<std::uint64_t>* frames_done = nullptr;  ///< replay flow control
 };
 
@@ -34,11 +36,13 @@ class BehaviourLoop {
       : params_(params),
         state_(make_state<B>(params)),
         wiring_(wiring),
-        frames_(*wiring.camera, B::kStream),
-        attitude_(*wiring.flight, shm::kAttitude, "Attitude"),
+        frames_(*wiring.camera, *wiring.flight, B::kStream),
+        vehicle_(*wiring.flight),
         cues_(*wiring.flight, shm::cue_topic(std::string(B::kName)), "Cue"),
         wake_(wiring.stages->add(B::kName, "wake-up", 0)),
-        compute_(wiring.stages->add(B::kName, "compute", wiring.budget_ns)) {}
+        compute_(wiring.stages->add(B::kName, "compute", wiring.budget_ns)) {
+    if constexpr (FlowSource<B>) flow_.emplace(*wiring.flight, ring_of(B::kPublishes));
+  }
 
   /// Runs until the stop flag. Real-time loop.
   void run(LoopControl& control) {
@@ -59,7 +63,7 @@ class BehaviourLoop {
   void serve(const Frame& frame) WASP_REALTIME {
     Cue cue;
     cue.started_at_ns = rt::now();
-    wiring_.watch->trace.record(cue.started_at_ns, rt::TraceKind::kFrame, frame.header.sequence,
+    wiring_.watch->trace.record(cue.started_at_ns, rt::TraceKind::kFrame, frame.sequence,
                                 cue.started_at_ns - frame.sample.published_at_ns);
     BehaviourInput input;
     if (gather(frame, input)) {
@@ -67,31 +71,38 @@ class BehaviourLoop {
       cue.body = B::step(params_, input, state_);
       cue.finished_at_ns = rt::now();
       wiring_.watch->busy_since_ns.store(0, std::memory_order_relaxed);
-      if (frames_.intact(frame)) publish(frame, input, cue);
+      if (frames_.intact(frame)) {
+        publish(frame, input, cue);
+        publish_flow(frame);
+      }
     }
     if (wiring_.frames_done != nullptr) wiring_.frames_done->store(frame.sample.number, std::memory_order_release);
   }
 
   bool gather(const Frame& frame, BehaviourInput& input) WASP_REALTIME {
-    input.exposed_at_ns = frame.header.exposed_at_ns;
-    input.frame_sequence = frame.header.sequence;
+    input.exposed_at_ns = frame.exposed_at_ns;
+    input.frame_sequence = frame.sequence;
     input.gray = frame.gray;
     input.depth = frame.depth;
+    input.flow = frame.flow;
     if (wiring_.script != nullptr) {
-      const ScriptedStep* step = find_step(*wiring_.script, frame.header.sequence);
-      if (step == nullptr) return frame.header.sequence >= wiring_.script_ends_at;  // a later lap: no attitude
+      const ScriptedStep* step = find_step(*wiring_.script, frame.sequence);
+      if (step == nullptr) return frame.sequence >= wiring_.script_ends_at;  // a later lap: nothing of the vehicle
       input.exposed_at_ns = step->exposed_at_ns;  // the recording's own time: what the first step was given
       input.attitude_valid = step->attitude_valid;
       input.attitude = step->attitude;
-    } else if (wiring_.attitude_from_link) {
-      input.attitude_valid = attitude_at(attitude_, input.exposed_at_ns, input.attitude);
+      input.accel_valid = step->accel_valid;
+      input.accel_body_mps2 = step->accel_body_mps2;
+    } else if (wiring_.vehicle_from_link) {
+      input.attitude_valid = vehicle_.attitude(input.exposed_at_ns, input.attitude);
+      input.accel_valid = vehicle_.mean_specific_force(input.exposed_at_ns, input.accel_body_mps2);
     }
     input.attitude.exposed_at_ns = input.exposed_at_ns;
     return true;
   }
 
   void publish(const Frame& frame, const BehaviourInput& input, Cue& cue) WASP_REALTIME {
-    cue.exposed_at_ns = frame.header.exposed_at_ns;
+    cue.exposed_at_ns = frame.shown_at_ns;
     cue.released_at_ns = frame.sample.published_at_ns;
     cue.behaviour = wiring_.index;
     cue.frame_sequence = input.frame_sequence;
@@ -99,12 +110,20 @@ class BehaviourLoop {
     cue.attitude_valid = input.attitude_valid ? 1 : 0;
     cue.q_ned_body = input.attitude.q_ned_body;
     cue.rate_body_radps = input.attitude.rate_body_radps;
+    cue.accel_valid = input.accel_valid ? 1 : 0;
+    cue.accel_body_mps2 = input.accel_body_mps2;
     const DurationNs compute_ns = cue.finished_at_ns - cue.started_at_ns;
     cue.over_budget = compute_ns > wiring_.budget_ns ? 1 : 0;
     wake_->record(cue.started_at_ns - cue.released_at_ns);
     compute_->record(compute_ns);
     cues_.write(cue, rt::now());
     hold_against_budget(cue, compute_ns);
+  }
+
+  /// The field of the step just made, for the behaviours that wait for it.
+  void publish_flow(const Frame& frame) WASP_REALTIME {
+    if constexpr (FlowSource<B>)
+      if (const FlowMessage* flow = B::flow(state_)) flow_->publish(*flow, frame.shown_at_ns, rt::now());
   }
 
   void hold_against_budget(const Cue& cue, DurationNs compute_ns) WASP_REALTIME {
@@ -129,8 +148,9 @@ class BehaviourLoop {
   typename B::State state_;
   BehaviourWiring wiring_;
   FrameSource frames_;
-  shm::RingReader attitude_;
+  VehicleHistory vehicle_;
   shm::RingWriter cues_;
+  std::optional<FlowWriter> flow_;  ///< of a flow source
   Stage* wake_;
   Stage* compute_;
   std::uint32_t steps_ = 0;

@@ -9,8 +9,7 @@
 #include <vector>
 
 #include "scheduling/behaviour_loop.h"
-#include "scheduling/toml_table.h"
-#include "types/camera.h"
+#include "scheduling/config.h"
 
 namespace wasp::scheduling {
 
@@ -79,5 +78,18 @@ BehaviourRow behaviour_row() {
 
 /// Names in the order of the table, which is that of Cue::behaviour.
 std::vector<std::string> names_of(const BehaviourTable& table);
+
+/// Marks which of the enabled behaviours look down, and checks that each can have its stream: one that looks down needs
+/// [camera_down], a flow field has exactly one enabled source where anybody reads it and never two. Throws ConfigError
+/// naming the behaviours.
+void check_streams(const BehaviourTable& table, Config& config);
+
+/// Switches off every enabled behaviour whose stream is not to be had from a camera that offers `offered` (topics), and
+/// those that read its flow fields. Returns one line for each, saying why.
+std::vector<std::string> disable_without_stream(const BehaviourTable& table, const std::vector<std::string>& offered,
+                                                Config& config);
+
+/// Topics of the flow fields that enabled behaviours make.
+std::vector<std::string> flow_topics(const BehaviourTable& table, const Config& config);
 
 }  // namespace wasp::scheduling

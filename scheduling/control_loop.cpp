@@ -27,10 +27,12 @@ ControlLoop::ControlLoop(const Config& config, const ControlWiring& wiring)
       line_(*wiring.port) {
   last_exposed_.fill(kNever);
   for (std::size_t i = 0; i < config.behaviours.size(); ++i) {
+    if (!config.behaviours[i].enabled) continue;
     const std::string& name = config.behaviours[i].name;
-    cues_.emplace_back(*wiring.flight, shm::cue_topic(name), "Cue");
-    behaviour_stages_.push_back({wiring.stages->add(name, "age at use", config.control.arbiter.rows[i].age_limit_ns),
-                                 wiring.stages->add(name, "end to end", 0)});
+    cues_.push_back({i, shm::RingReader(*wiring.flight, shm::cue_topic(name), "Cue"),
+                     i < wiring.behaviour_watches.size() ? wiring.behaviour_watches[i] : nullptr,
+                     wiring.stages->add(name, "age at use", config.control.arbiter.rows[i].age_limit_ns),
+                     wiring.stages->add(name, "end to end", 0)});
   }
 }
 
@@ -91,9 +93,10 @@ void ControlLoop::end_of_tick(const control::ControlInput& input, LoopControl& c
 }
 
 void ControlLoop::gather(control::ControlInput& input) WASP_REALTIME {
-  for (std::size_t i = 0; i < cues_.size(); ++i) {
-    input.cues.present[i] = cues_[i].copy_newest(input.cues.cues[i]);
-    input.cues.overdue[i] = i < wiring_.behaviour_watches.size() && wiring_.behaviour_watches[i]->overdue(input.now_ns);
+  for (const CueSource& source : cues_) {
+    const std::size_t i = source.behaviour;
+    input.cues.present[i] = source.ring.copy_newest(input.cues.cues[i]);
+    input.cues.overdue[i] = source.watch != nullptr && source.watch->overdue(input.now_ns);
   }
   input.attitude_present = attitude_.copy_newest(input.attitude);
   mean_acceleration(input);
@@ -191,9 +194,10 @@ void ControlLoop::account(const control::ControlInput& input, const Command& com
 
 void ControlLoop::account_cues(const control::ControlInput& input, const Command& command,
                                RunStatus& status) WASP_REALTIME {
-  for (std::size_t i = 0; i < cues_.size(); ++i) {
+  for (const CueSource& source : cues_) {
+    const std::size_t i = source.behaviour;
     const Cue& cue = input.cues.cues[i];
-    const bool demoted = i < wiring_.behaviour_watches.size() && wiring_.behaviour_watches[i]->demoted.load() != 0;
+    const bool demoted = source.watch != nullptr && source.watch->demoted.load() != 0;
     const bool late = input.cues.overdue[i] || (input.cues.present[i] && cue.over_budget != 0);
     const auto state = demoted ? BehaviourState::kDemoted
                        : late  ? BehaviourState::kOverBudget
@@ -201,9 +205,9 @@ void ControlLoop::account_cues(const control::ControlInput& input, const Command
     if (i < status.behaviour_state.size())
       status.behaviour_state[i].store(static_cast<std::uint32_t>(state), std::memory_order_relaxed);
     if (!input.cues.present[i]) continue;
-    behaviour_stages_[i].age->record(input.now_ns - cue.exposed_at_ns);
+    source.age->record(input.now_ns - cue.exposed_at_ns);
     if (command.written_at_ns == 0 || cue.exposed_at_ns == last_exposed_[i]) continue;
-    behaviour_stages_[i].end_to_end->record(command.written_at_ns - cue.exposed_at_ns);
+    source.end_to_end->record(command.written_at_ns - cue.exposed_at_ns);
     last_exposed_[i] = cue.exposed_at_ns;
   }
 }

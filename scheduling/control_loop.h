@@ -40,7 +40,7 @@ struct ControlWiring {
   drivers::AutopilotLink* autopilot = nullptr;
   EventQueue* events = nullptr;
   ThreadWatch* watch = nullptr;                            ///< required
-  std::vector<const ThreadWatch*> behaviour_watches = {};  ///< by Cue::behaviour; may be empty
+  std::vector<const ThreadWatch*> behaviour_watches = {};  ///< by Cue::behaviour, nullptr: not enabled; may be empty
   ControlHook hook = {};
 };
 
@@ -52,9 +52,13 @@ class ControlLoop {
   [[nodiscard]] bool mission_over() const noexcept { return mission_over_.load(); }
 
  private:
-  struct BehaviourStages {
-    Stage* age = nullptr;
-    Stage* end_to_end = nullptr;
+  /// An enabled behaviour.
+  struct CueSource {
+    std::size_t behaviour;  ///< Cue::behaviour
+    shm::RingReader ring;
+    const ThreadWatch* watch;  ///< may be nullptr
+    Stage* age;
+    Stage* end_to_end;
   };
   void tick(const rt::Release& release, LoopControl& control) WASP_REALTIME;
   void gather(control::ControlInput& input) WASP_REALTIME;
@@ -75,10 +79,9 @@ class ControlLoop {
   Config config_;
   ControlWiring wiring_;
   control::ControlState state_;
-  std::vector<shm::RingReader> cues_;
+  std::vector<CueSource> cues_;
   shm::RingReader attitude_, imu_;
   shm::RingWriter commands_;
-  std::vector<BehaviourStages> behaviour_stages_;
   Stage *wake_, *compute_, *write_, *tick_to_byte_;
   SetpointLine line_;
   std::array<std::uint8_t, 1024> out_{};

@@ -44,6 +44,13 @@ drivers::LinkIdentity identity_of(const Config& config) {
   return id;
 }
 
+BehaviourRings rings_of(const BehaviourTable& table, const Config& config) {
+  BehaviourRings rings{names_of(table), {}, flow_topics(table, config)};
+  for (const auto& row : config.behaviours)
+    if (!row.enabled) rings.silent.push_back(row.name);
+  return rings;
+}
+
 /// Takes a region's files away again unless told that its readers still need them.
 struct RegionFiles {
   std::string name;
@@ -51,6 +58,12 @@ struct RegionFiles {
   ~RegionFiles() {
     if (!keep && !name.empty()) shm::Region::remove(name);
   }
+};
+
+/// What the thread of an enabled behaviour runs.
+struct ThreadBody {
+  std::size_t behaviour = 0;  ///< Cue::behaviour
+  std::function<void(LoopControl&)> run;
 };
 
 /// Everything one flight owns, in order of construction; destroyed in reverse, threads first.
@@ -61,7 +74,7 @@ class Flight {
         options_(options),
         config_(std::move(config)),
         real_time_(!options.no_rt),
-        flight_(create_flight_region(options.instance, names_of(table), real_time_)),
+        flight_(create_flight_region(options.instance, rings_of(table, config_), real_time_)),
         flight_files_{flight_.name()},
         stages_(stage_table(flight_)),
         port_(drivers::SerialEndpoint::parse(config_.endpoint)),
@@ -97,6 +110,7 @@ class Flight {
       if (config_.camera_driver == "replay")
         throw std::runtime_error("[camera] driver = \"replay\" needs --replay DIR");
       camera_ = std::make_unique<shm::Region>(attach_camera(options_.instance, 30.0, [] { return false; }));
+      check_camera();
       return;
     }
     auto recording = drivers::Recording::open(options_.replay);
@@ -109,13 +123,27 @@ class Flight {
     const double seconds = options_.seconds > 0 ? options_.seconds : to_seconds(ReplayCamera::lap_ns(recording));
     config_.control.mission.follow_recording = true;
     config_.control.mission.recording_seconds = static_cast<float>(seconds + kReplayTail_s);
+    const auto topics = ReplayCamera::topics(recording);
+    std::vector<std::string> offered;
+    for (const auto& topic : topics) offered.push_back(topic.name);
+    for (const auto& line : disable_without_stream(table_, offered, config_)) log(line);
+    check_streams(table_, config_);
     if (recording.depth_size().width_px == 0) fly_on_grey_images();
-    camera_ = std::make_unique<shm::Region>(
-        shm::Region::create(shm::camera_region(options_.instance), ReplayCamera::topics(recording)));
+    camera_ = std::make_unique<shm::Region>(shm::Region::create(shm::camera_region(options_.instance), topics));
     camera_files_.name = camera_->name();
     replay_ = std::make_unique<ReplayCamera>(std::move(recording), *camera_, from_seconds(seconds), stages_,
                                              add_watch(config_.camera_thread), config_.camera_thread.overrun);
     if (options_.preload) replay_->preload();
+  }
+
+  /// Refuses a camera that does not offer what an enabled behaviour looks at.
+  void check_camera() const {
+    for (std::size_t i = 0; i < table_.size(); ++i) {
+      const BehaviourRow& row = table_[i];
+      if (config_.behaviours[i].enabled && !is_flow(row.stream) && !camera_->has(ring_of(row.stream)))
+        throw std::runtime_error("behaviour '" + row.name + "' is enabled, but the camera offers no '" +
+                                 ring_of(row.stream) + "'");
+    }
   }
 
   ThreadWatch& add_watch(const ThreadRow& row, bool behaviour = false) {
@@ -131,38 +159,44 @@ class Flight {
     log("the recording has no depth: height comes from grey images");
     for (std::size_t i = 0; i < table_.size(); ++i) {
       auto& rank = config_.control.arbiter.rows[i].height_rank;
-      if (table_[i].stream == Stream::kGray && rank < 0) rank = static_cast<int>(i);
+      if (config_.behaviours[i].enabled && table_[i].stream == Stream::kGray && rank < 0) rank = static_cast<int>(i);
     }
   }
 
   void wire() {
     ControlWiring control{&flight_, &stages_, &report_, &port_, &autopilot_, &control_events_};
-    for (std::size_t i = 0; i < table_.size(); ++i) {
-      const BehaviourRow& row = table_[i];
-      BehaviourWiring w;
-      w.camera = camera_.get();
-      w.flight = &flight_;
-      w.index = static_cast<std::uint32_t>(i);
-      w.budget_ns = config_.behaviours[i].budget_ns;
-      w.frames_in_order = config_.behaviours[i].frames_in_order;
-      w.stages = &stages_;
-      w.watch = &add_watch(config_.behaviours[i], true);
-      control.behaviour_watches.push_back(w.watch);
-      if (replay_) {
-        w.attitude_from_link = false;
-        w.frames_done = replay_->add_reader(row.stream == Stream::kDepth);
-        if (const auto script = scripts_.find(row.name); script != scripts_.end()) {
-          w.script = &script->second;
-          w.script_ends_at = second_lap_;
-        }
-      }
-      bodies_.push_back(row.make(config_.camera, config_.behaviour_params[i], w));
-    }
+    for (std::size_t i = 0; i < table_.size(); ++i)
+      control.behaviour_watches.push_back(config_.behaviours[i].enabled ? wire_behaviour(i) : nullptr);
     link_ = std::make_unique<LinkLoop>(flight_, port_, autopilot_, stages_, report_, link_events_,
                                        add_watch(config_.link_thread));
     control.watch = &add_watch(config_.control_thread);
     control_loop_ = std::make_unique<ControlLoop>(config_, control);
     supervisor_ = std::make_unique<Supervisor>(board_, *control_.status, supervisor_options(), log);
+  }
+
+  /// Builds the adaptor of an enabled behaviour.
+  const ThreadWatch* wire_behaviour(std::size_t i) {
+    const BehaviourRow& row = table_[i];
+    BehaviourWiring w;
+    w.camera = camera_.get();
+    w.flight = &flight_;
+    w.index = static_cast<std::uint32_t>(i);
+    w.budget_ns = config_.behaviours[i].budget_ns;
+    w.frames_in_order = config_.behaviours[i].frames_in_order;
+    w.stages = &stages_;
+    w.watch = &add_watch(config_.behaviours[i], true);
+    if (replay_) {
+      w.vehicle_from_link = false;
+      w.frames_done = replay_->add_reader(
+          shm::RingReader(is_flow(row.stream) ? flight_ : *camera_, ring_of(row.stream), type_of(row.stream)));
+      if (const auto script = scripts_.find(row.name); script != scripts_.end()) {
+        w.script = &script->second;
+        w.script_ends_at = second_lap_;
+      }
+    }
+    const CameraGeometry& camera = looks_down(row.stream) ? config_.camera_down.geometry : config_.camera;
+    bodies_.push_back({i, row.make(camera, config_.behaviour_params[i], w)});
+    return w.watch;
   }
 
   SupervisorOptions supervisor_options() const {
@@ -180,8 +214,8 @@ class Flight {
   }
 
   void start_threads() {
-    for (std::size_t i = 0; i < bodies_.size(); ++i)
-      threads_.emplace_back(spec(config_.behaviours[i]), [this, i] { bodies_[i](control_); });
+    for (const auto& body : bodies_)
+      threads_.emplace_back(spec(config_.behaviours[body.behaviour]), [this, &body] { body.run(control_); });
     threads_.emplace_back(spec(config_.link_thread), [this] { link_->run(control_); });
     if (replay_) {
       threads_.emplace_back(spec(config_.camera_thread), [this] { replay_->run(control_); });
@@ -239,7 +273,7 @@ class Flight {
   std::unique_ptr<LinkLoop> link_;
   std::unique_ptr<ControlLoop> control_loop_;
   std::unique_ptr<Supervisor> supervisor_;
-  std::vector<std::function<void(LoopControl&)>> bodies_;
+  std::vector<ThreadBody> bodies_;
   std::vector<rt::Thread> threads_;  // joined first
 };
 
@@ -259,7 +293,9 @@ int flight_main(const BehaviourTable& behaviours, int argc, char** argv) {
   if (options.check_rights) return check_rights(Config{}.control_thread.priority);
   const sigset_t signals = block_signals();
   try {
-    Flight flight(behaviours, options, load_config(options.configs, names_of(behaviours)));
+    Config config = load_config(options.configs, names_of(behaviours));
+    if (options.replay.empty()) check_streams(behaviours, config);
+    Flight flight(behaviours, options, std::move(config));
     return flight.run(signals);
   } catch (const std::exception& e) {
     std::fprintf(stderr, "wasp flight: %s\n", e.what());

@@ -1,9 +1,11 @@
 #include "scheduling/flight_regions.h"
 
+#include <algorithm>
 #include <new>
 #include <stdexcept>
 
 #include "rt/clock.h"
+#include "scheduling/flow_ring.h"
 #include "shm/topics.h"
 #include "types/messages.h"
 
@@ -18,8 +20,7 @@ std::byte* block(const shm::Region& region, const char* topic, const char* type)
 
 }  // namespace
 
-shm::Region create_flight_region(const std::string& instance, const std::vector<std::string>& behaviours,
-                                 bool real_time) {
+shm::Region create_flight_region(const std::string& instance, const BehaviourRings& behaviours, bool real_time) {
   std::vector<shm::TopicSpec> specs{
       {shm::kImu, "Imu", TopicKind::kRing, shm::kImuSlots, sizeof(ImuSample)},
       {shm::kAttitude, "Attitude", TopicKind::kRing, shm::kAttitudeSlots, sizeof(AttitudeSample)},
@@ -27,16 +28,23 @@ shm::Region create_flight_region(const std::string& instance, const std::vector<
       {shm::kStages, "StageTable", TopicKind::kBlock, 1, sizeof(StageTable)},
       {"run", "RunStatus", TopicKind::kBlock, 1, sizeof(RunStatus)},
   };
-  for (const auto& name : behaviours)
-    specs.push_back({shm::cue_topic(name), "Cue", TopicKind::kRing, shm::kCueSlots, sizeof(Cue)});
+  const auto silent = [&](const std::string& name) { return std::ranges::count(behaviours.silent, name) > 0; };
+  for (const auto& topic : behaviours.flows)
+    specs.push_back({topic, "Flow", TopicKind::kRing, shm::kFlowSlots, sizeof(FlowSlot)});
+  for (const auto& name : behaviours.names)
+    if (!silent(name)) specs.push_back({shm::cue_topic(name), "Cue", TopicKind::kRing, shm::kCueSlots, sizeof(Cue)});
   shm::Region region =
       shm::Region::create(shm::flight_region(instance), specs, real_time ? "real time" : "NOT REAL TIME");
   new (block(region, shm::kStages, "StageTable")) StageTable;
   auto* status = new (block(region, "run", "RunStatus")) RunStatus;
   status->real_time = real_time ? 1 : 0;
-  for (std::size_t i = 0; i < behaviours.size() && i < status->behaviours.size(); ++i)
-    std::copy_n(behaviours[i].begin(), std::min<std::size_t>(behaviours[i].size(), 31), status->behaviours[i].begin());
-  status->behaviour_count = static_cast<std::uint32_t>(behaviours.size());
+  const auto& names = behaviours.names;
+  for (std::size_t i = 0; i < names.size() && i < status->behaviours.size(); ++i) {
+    std::copy_n(names[i].begin(), std::min<std::size_t>(names[i].size(), 31), status->behaviours[i].begin());
+    status->behaviour_state[i] =
+        static_cast<std::uint32_t>(silent(names[i]) ? BehaviourState::kOff : BehaviourState::kPunctual);
+  }
+  status->behaviour_count = static_cast<std::uint32_t>(names.size());
   return region;
 }
 

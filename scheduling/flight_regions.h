@@ -10,10 +10,16 @@
 
 namespace wasp::scheduling {
 
-/// Creates wasp.<instance>.flight with imu, attitude, command, one cue topic per behaviour, stages and run. A region
-/// left by a crashed flight is taken over with its history; its counters start anew.
-shm::Region create_flight_region(const std::string& instance, const std::vector<std::string>& behaviours,
-                                 bool real_time);
+/// Which rings a flight's region has for its behaviours.
+struct BehaviourRings {
+  std::vector<std::string> names = {};   ///< all behaviours, in the order of Cue::behaviour
+  std::vector<std::string> silent = {};  ///< those that are not enabled: no cue ring
+  std::vector<std::string> flows = {};   ///< topics of flow fields
+};
+
+/// Creates wasp.<instance>.flight with imu, attitude, command, one cue topic per enabled behaviour, flow fields, stages
+/// and run. A region left by a crashed flight is taken over with its history; its counters start anew.
+shm::Region create_flight_region(const std::string& instance, const BehaviourRings& behaviours, bool real_time);
 
 StageTable& stage_table(const shm::Region& flight);
 RunStatus& run_status(const shm::Region& flight);

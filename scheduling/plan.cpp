@@ -73,7 +73,9 @@ int plan_main(const BehaviourTable& behaviours, int argc, char** argv) {
     return app.exit(e) == 0 ? 0 : 2;
   }
   try {
-    const Config config = load_config(configs, names_of(behaviours));
+    Config config = load_config(configs, names_of(behaviours));
+    if (replay) disable_without_stream(behaviours, {shm::kGray, shm::kDepth}, config);
+    check_streams(behaviours, config);
     const Plan plan = make_plan(config, from_seconds(1.0 / config.camera_rate_hz), replay,
                                 measured.empty() ? MeasuredCosts{} : read_measured_costs(measured));
     std::fputs((json ? plan_json(plan) + "\n" : plan_text(plan)).c_str(), stdout);

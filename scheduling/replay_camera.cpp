@@ -9,7 +9,10 @@
 namespace wasp::scheduling {
 namespace {
 
-constexpr std::uint64_t kMaxBehind = 4;  // of kFrameSlots: the slot under a reader is never the next to be written
+// Messages that may lie unread when the next frame is published. Frames: the slot under a reader is never the next to
+// be written. Flow fields: those of the frames that lie unread before the source come on top, so twice as many.
+constexpr std::uint64_t kMaxBehind = 4;
+static_assert(kMaxBehind + 2 <= shm::kFrameSlots && 2 * kMaxBehind + 2 <= shm::kFlowSlots);
 constexpr DurationNs kPatience = 20 * kSecond;
 
 void write_frame(shm::RingWriter& ring, const void* pixels, drivers::Recording::Size size, std::uint32_t pixel_bytes,
@@ -28,6 +31,10 @@ void write_frame(shm::RingWriter& ring, const void* pixels, drivers::Recording::
   ring.publish(rt::now());
 }
 
+std::unique_ptr<shm::RingWriter> writer_of(const shm::Region& camera, const char* topic) {
+  return camera.has(topic) ? std::make_unique<shm::RingWriter>(camera, topic, "Frame") : nullptr;
+}
+
 }  // namespace
 
 std::vector<shm::TopicSpec> ReplayCamera::topics(const drivers::Recording& r) {
@@ -35,8 +42,10 @@ std::vector<shm::TopicSpec> ReplayCamera::topics(const drivers::Recording& r) {
   const auto bytes = [](drivers::Recording::Size size, std::size_t pixel_bytes) {
     return kFramePixelOffset + std::max<std::size_t>(64, size.pixels() * pixel_bytes);
   };
-  specs.push_back({shm::kDepth, "Frame", shm::TopicKind::kRing, shm::kFrameSlots, bytes(r.depth_size(), 2)});
-  specs.push_back({shm::kGray, "Frame", shm::TopicKind::kRing, shm::kFrameSlots, bytes(r.gray_size(), 1)});
+  if (r.depth_size().pixels() > 0)
+    specs.push_back({shm::kDepth, "Frame", shm::TopicKind::kRing, shm::kFrameSlots, bytes(r.depth_size(), 2)});
+  if (r.gray_size().pixels() > 0)
+    specs.push_back({shm::kGray, "Frame", shm::TopicKind::kRing, shm::kFrameSlots, bytes(r.gray_size(), 1)});
   return specs;
 }
 
@@ -44,8 +53,8 @@ ReplayCamera::ReplayCamera(drivers::Recording recording, const shm::Region& came
                            StageTable& stages, ThreadWatch& watch, rt::OverrunPolicy overrun)
     : recording_(std::move(recording)),
       length_ns_(length_ns),
-      depth_(std::make_unique<shm::RingWriter>(camera, shm::kDepth, "Frame")),
-      gray_(std::make_unique<shm::RingWriter>(camera, shm::kGray, "Frame")),
+      depth_(writer_of(camera, shm::kDepth)),
+      gray_(writer_of(camera, shm::kGray)),
       pool_(recording_.depth_size().pixels(), recording_.gray_size().pixels()),
       release_(stages.add("camera", "release", 0)),
       compute_(stages.add("camera", "compute", watch.budget_ns)),
@@ -53,9 +62,8 @@ ReplayCamera::ReplayCamera(drivers::Recording recording, const shm::Region& came
       overrun_(overrun),
       frame_period_ns_(from_seconds(1.0 / recording_.nominal_rate_hz())) {}
 
-std::atomic<std::uint64_t>* ReplayCamera::add_reader(bool depth) {
-  readers_.push_back(std::make_unique<Reader>());
-  readers_.back()->depth = depth;
+std::atomic<std::uint64_t>* ReplayCamera::add_reader(shm::RingReader ring) {
+  readers_.push_back(std::make_unique<Reader>(std::move(ring)));
   return &readers_.back()->done;
 }
 
@@ -126,18 +134,16 @@ void ReplayCamera::decode(LoopControl& control) {
 }
 
 bool ReplayCamera::readers_keep_up() const noexcept {
-  for (const auto& r : readers_) {
-    const std::uint64_t newest = (r->depth ? depth_ : gray_)->published();
-    if (newest - r->done.load(std::memory_order_acquire) >= kMaxBehind) return false;
-  }
+  for (const auto& r : readers_)
+    if (r->ring.newest() - r->done.load(std::memory_order_acquire) >= kMaxBehind) return false;
   return true;
 }
 
 void ReplayCamera::publish(const DecodedFrame& frame, TimeNs exposed_at_ns) WASP_REALTIME {
-  if (frame.has_depth)
+  if (frame.has_depth && depth_)
     write_frame(*depth_, frame.depth_mm.data(), recording_.depth_size(), 2, PixelFormat::kDepth16Mm, frame.sequence,
                 exposed_at_ns);
-  if (frame.has_gray)
+  if (frame.has_gray && gray_)
     write_frame(*gray_, frame.gray.data(), recording_.gray_size(), 1, PixelFormat::kMono8, frame.sequence,
                 exposed_at_ns);
 }

@@ -1,7 +1,8 @@
 // The replay camera: an ordinary thread decodes ahead, a real-time thread loans ring slots and publishes each frame at
-// its recorded time, so that behaviours see a camera. Should a behaviour fall several frames behind (a stalled host),
-// the camera holds the next frame back and counts it: with the overrun policy catch_up a replay loses nothing. Under
-// skip a frame that is more than one frame period late is dropped, as a camera would drop it.
+// its recorded time, so that behaviours see a camera: depth first, then the grey frame of the same exposure. Should a
+// behaviour fall several frames or flow fields behind (a stalled host), the camera holds the next frame back and counts
+// it: with the overrun policy catch_up a replay loses nothing. Under skip a frame that is more than one frame period
+// late is dropped, as a camera would drop it.
 #pragma once
 
 #include <algorithm>
@@ -36,8 +37,9 @@ class ReplayCamera {
     return recording.entries().back().sequence + 1;
   }
 
-  /// A behaviour that must not lose frames: number of its stream's newest frame it has finished with.
-  std::atomic<std::uint64_t>* add_reader(bool depth);
+  /// A behaviour that must not lose messages of `ring`: a ring of the camera's region, or one of flow fields, which
+  /// fills as fast as its source steps. Returns where the behaviour says the number of the newest one it is done with.
+  std::atomic<std::uint64_t>* add_reader(shm::RingReader ring);
 
   /// Decodes every frame once, before arming, and keeps it: for processors too slow to decode at the frame rate.
   void preload();
@@ -55,8 +57,9 @@ class ReplayCamera {
 
  private:
   struct Reader {
-    bool depth = false;
-    std::atomic<std::uint64_t> done{0};
+    shm::RingReader ring;
+    std::atomic<std::uint64_t> done;
+    explicit Reader(shm::RingReader r) : ring(std::move(r)), done(ring.newest()) {}
   };
   bool load(std::size_t index, DecodedFrame& frame);
   bool decode_one(std::size_t index, DurationNs offset_ns, std::uint32_t sequence, DecodedFrame& frame);
@@ -69,7 +72,7 @@ class ReplayCamera {
 
   drivers::Recording recording_;
   DurationNs length_ns_;
-  std::unique_ptr<shm::RingWriter> depth_, gray_;
+  std::unique_ptr<shm::RingWriter> depth_, gray_;  ///< nullptr: the recording has no such stream
   FramePool pool_;
   std::vector<DecodedFrame> preloaded_;  ///< by entry; empty without preload()
   std::vector<std::unique_ptr<Reader>> readers_;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <fstream>
+#include <optional>
 #include <stdexcept>
 #include <string_view>
 
@@ -27,9 +28,12 @@ class Columns {
     for (std::size_t i = 0; i < cells.size(); ++i) index_[std::string(cells[i])] = i;
   }
   [[nodiscard]] std::size_t at(const std::string& name) const {
+    if (const auto column = find(name)) return *column;
+    throw std::runtime_error(path_ + ": no column '" + name + "'");
+  }
+  [[nodiscard]] std::optional<std::size_t> find(const std::string& name) const {
     const auto it = index_.find(name);
-    if (it == index_.end()) throw std::runtime_error(path_ + ": no column '" + name + "'");
-    return it->second;
+    return it == index_.end() ? std::nullopt : std::optional(it->second);
   }
 
  private:
@@ -61,6 +65,7 @@ std::map<std::string, BehaviourScript> load_replay_script(const std::string& fol
                     valid = columns.at("attitude_valid");
   const std::size_t exposed = columns.at("exposed_at_ns"), q = columns.at("q_w"),
                     rate = columns.at("rate_x_body_radps");
+  const auto accel_valid = columns.find("accel_valid"), accel = columns.find("accel_x_body_mps2");
   for (int number = 2; std::getline(file, line); ++number) {
     const std::string where = path + ":" + std::to_string(number);
     const auto cells = split(line);
@@ -70,6 +75,10 @@ std::map<std::string, BehaviourScript> load_replay_script(const std::string& fol
     step.exposed_at_ns = parse<TimeNs>(cells, exposed, where);
     for (std::size_t i = 0; i < 4; ++i) step.attitude.q_ned_body[i] = parse<float>(cells, q + i, where);
     for (std::size_t i = 0; i < 3; ++i) step.attitude.rate_body_radps[i] = parse<float>(cells, rate + i, where);
+    if (accel_valid && accel) {
+      step.accel_valid = parse<int>(cells, *accel_valid, where) != 0;
+      for (std::size_t i = 0; i < 3; ++i) step.accel_body_mps2[i] = parse<float>(cells, *accel + i, where);
+    }
     if (name >= cells.size()) throw std::runtime_error(where + ": too few columns");
     scripts[std::string(cells[name])].push_back(step);
   }

@@ -1,5 +1,6 @@
-// What the behaviours were given when a recording was made: for each behaviour, the frames it stepped on and the exact
-// attitude. Replaying with it gives the same cues to the bit, whatever the timing of the replay.
+// What the behaviours were given when a recording was made: for each behaviour, the frames it stepped on (for one that
+// reads flow: the second frame of each field) and the exact attitude and specific force. Replaying with it gives the
+// same cues to the bit, whatever the timing of the replay.
 #pragma once
 
 #include <map>
@@ -16,6 +17,8 @@ struct ScriptedStep {
   TimeNs exposed_at_ns = 0;
   bool attitude_valid = false;
   AttitudeSample attitude;
+  bool accel_valid = false;  ///< false throughout in recordings older than these columns
+  std::array<float, 3> accel_body_mps2{};
 };
 
 /// Steps of one behaviour in order of frames.

@@ -65,7 +65,8 @@ enum class MissionResult : std::uint32_t { kUnderWay = 0, kFlown = 1, kBrokenOff
 enum class BehaviourState : std::uint32_t {
   kPunctual = 0,
   kOverBudget = 1,  ///< its last step was over its budget, or the one under way is: the cue is stale
-  kDemoted = 2      ///< taken out of SCHED_FIFO for this flight
+  kDemoted = 2,     ///< taken out of SCHED_FIFO for this flight
+  kOff = 3          ///< not enabled: no thread, no cue ring
 };
 
 /// Block topic "run" (type RunStatus): the state of the flight in single words. One writer a word.

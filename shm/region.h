@@ -18,8 +18,8 @@
 namespace wasp::shm {
 
 inline constexpr std::uint64_t kMagic = 0x31'70'73'61'77ull;  // "wasp1"
-inline constexpr std::uint32_t kLayoutVersion = 1;
-inline constexpr std::size_t kMaxTopics = 24;
+inline constexpr std::uint32_t kLayoutVersion = 2;
+inline constexpr std::size_t kMaxTopics = 36;
 inline constexpr std::size_t kPage = 4096;
 
 enum class TopicKind : std::uint32_t { kNone = 0, kRing = 1, kBlock = 2 };

@@ -1,8 +1,11 @@
 // Names of the regions and topics: the one list that writers and readers share.
 //
-//   wasp.<instance>.camera   gray, depth            written by whoever is the camera (simulator, replay, driver
-//   process) wasp.<instance>.flight   imu, attitude, cue.<behaviour>, command, stages, run     written by the flight
-//   process wasp.<instance>.truth    truth                  written by the simulator; no flight thread reads it
+//   wasp.<instance>.camera   gray, depth, gray.down      written by whoever is the camera (simulator, replay, driver
+//                                                        process); the last one only where a camera looks down
+//   wasp.<instance>.flight   imu, attitude, flow, flow.down, cue.<behaviour>, command, stages, run
+//                                                        written by the flight process; a flow ring only where a
+//                                                        behaviour makes it, a cue ring for every enabled behaviour
+//   wasp.<instance>.truth    truth                       written by the simulator; no flight thread reads it
 #pragma once
 
 #include <cstdint>
@@ -14,16 +17,20 @@ inline std::string camera_region(const std::string& instance) { return "wasp." +
 inline std::string flight_region(const std::string& instance) { return "wasp." + instance + ".flight"; }
 inline std::string truth_region(const std::string& instance) { return "wasp." + instance + ".truth"; }
 
-inline constexpr const char* kGray = "gray";          ///< type Frame: FrameHeader, then pixels at kFramePixelOffset
-inline constexpr const char* kDepth = "depth";        ///< type Frame
-inline constexpr const char* kImu = "imu";            ///< type Imu: ImuSample
-inline constexpr const char* kAttitude = "attitude";  ///< type Attitude: AttitudeSample
-inline constexpr const char* kCommand = "command";    ///< type Command
-inline constexpr const char* kTruth = "truth";        ///< type Truth
-inline constexpr const char* kStages = "stages";      ///< block, type StageTable: latency of every stage
+inline constexpr const char* kGray = "gray";           ///< type Frame: FrameHeader, then pixels at kFramePixelOffset
+inline constexpr const char* kDepth = "depth";         ///< type Frame; before the grey frame of the same exposure
+inline constexpr const char* kGrayDown = "gray.down";  ///< type Frame: the camera that looks down
+inline constexpr const char* kFlow = "flow";           ///< type Flow: FlowMessage first (scheduling/flow_ring.h)
+inline constexpr const char* kFlowDown = "flow.down";  ///< type Flow: of the camera that looks down
+inline constexpr const char* kImu = "imu";             ///< type Imu: ImuSample
+inline constexpr const char* kAttitude = "attitude";   ///< type Attitude: AttitudeSample
+inline constexpr const char* kCommand = "command";     ///< type Command
+inline constexpr const char* kTruth = "truth";         ///< type Truth
+inline constexpr const char* kStages = "stages";       ///< block, type StageTable: latency of every stage
 inline std::string cue_topic(const std::string& behaviour) { return "cue." + behaviour; }  ///< type Cue
 
 inline constexpr std::uint32_t kFrameSlots = 8;  ///< 266 ms at 30 Hz
+inline constexpr std::uint32_t kFlowSlots = 16;  ///< more than twice what a replay lets lie unread (replay_camera.cpp)
 inline constexpr std::uint32_t kImuSlots = 512;  ///< 2.5 s at 200 Hz: history to match a frame against
 inline constexpr std::uint32_t kAttitudeSlots = 256;
 inline constexpr std::uint32_t kCueSlots = 64;

@@ -1,4 +1,4 @@
-// The camera of wasp-sim in one piece: the laboratory, its renderer, the region with the frames, the thread. Built
+// The cameras of wasp-sim in one piece: the world, its renderers, the region with the frames, the thread. Built
 // without the renderer (WASP_FLIGHT_ONLY) it refuses to be made: sim/camera_absent.cpp.
 #pragma once
 

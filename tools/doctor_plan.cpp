@@ -53,9 +53,9 @@ DoctorPlan plan_doctor(const std::string& config, int core, double seconds) {
   plan.control_budget_ns = c.control_thread.budget_ns;
   plan.tty = drivers::SerialEndpoint::parse(c.endpoint).path;
   plan.core = rt::nearest_usable_core(core >= 0 ? core : c.control_thread.core);
-  std::vector<scheduling::ThreadRow> rows = c.behaviours;
-  rows.push_back(c.control_thread);
-  rows.push_back(c.link_thread);
+  std::vector<scheduling::ThreadRow> rows{c.control_thread, c.link_thread};
+  for (const auto& row : c.behaviours)
+    if (row.enabled) rows.push_back(row);
   for (const auto& row : rows) {
     plan.priorities.insert(row.priority);
     plan.flight_cores.insert(rt::nearest_usable_core(core >= 0 ? core : row.core));

@@ -23,7 +23,7 @@ std::string_view mission_text(std::uint32_t result) {
 std::string late_behaviours(const RunSummary& r) {
   std::string text;
   for (std::size_t i = 0; i < std::min(r.behaviours.size(), r.behaviour_states.size()); ++i)
-    if (r.behaviour_states[i] != 0)
+    if (r.behaviour_states[i] == 1 || r.behaviour_states[i] == 2)  // 3: not enabled
       text += fmt::format("   {} {}", r.behaviours[i], r.behaviour_states[i] == 1 ? "OVER BUDGET" : "DEMOTED");
   return text;
 }

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <cmath>
 #include <cstring>
 #include <thread>
 
@@ -31,6 +32,7 @@ struct Mean {
     body.height_m = static_cast<float>(sum) / static_cast<float>(in.gray.width_px);
     body.detail[0] = in.attitude_valid ? in.attitude.q_ned_body[1] : -1.f;
     body.detail[1] = static_cast<float>(++state.steps);
+    body.detail[2] = in.accel_valid ? in.accel_body_mps2[2] : -1.f;
     return body;
   }
 };
@@ -41,7 +43,7 @@ class BehaviourLoopTest : public ::testing::Test {
   BehaviourLoopTest()
       : instance_("test-loop-" + std::to_string(getpid())),
         camera_(shm::Region::create(shm::camera_region(instance_), camera_topics())),
-        flight_(create_flight_region(instance_, {"mean"}, false)),
+        flight_(create_flight_region(instance_, {.names = {"mean"}}, false)),
         gray_(camera_, shm::kGray),
         attitude_(flight_, shm::kAttitude),
         cues_(flight_, shm::cue_topic("mean"), "Cue") {
@@ -102,9 +104,10 @@ TEST_F(BehaviourLoopTest, CueCarriesInputsAndTimes) {
   const TimeNs exposed = rt::now();
   AttitudeSample early, late;
   early.exposed_at_ns = exposed - 5 * kMillisecond;
-  early.q_ned_body = {1, 0.25f, 0, 0};
-  late.exposed_at_ns = exposed + 5 * kMillisecond;  // after the exposure: must not be used
-  late.q_ned_body = {1, 0.75f, 0, 0};
+  early.rate_body_radps = {2, 0, 0};
+  late.exposed_at_ns = exposed + 5 * kMillisecond;  // gives its rates to the turn from the one before, no more
+  late.q_ned_body = {0, 1, 0, 0};
+  late.rate_body_radps = {4, 0, 0};
   attitude_.write(early, exposed);
   attitude_.write(late, exposed);
   with_loop(wiring(), [&] {
@@ -114,7 +117,8 @@ TEST_F(BehaviourLoopTest, CueCarriesInputsAndTimes) {
     EXPECT_EQ(cue.exposed_at_ns, exposed);
     EXPECT_FLOAT_EQ(cue.body.height_m, 40.f);
     EXPECT_EQ(cue.attitude_valid, 1u);
-    EXPECT_FLOAT_EQ(cue.body.detail[0], 0.25f);
+    EXPECT_NEAR(cue.body.detail[0], std::sin(0.5f * 0.005f * 2.5f), 1e-7f);
+    EXPECT_FLOAT_EQ(cue.rate_body_radps[0], 3.f);
     EXPECT_LE(cue.exposed_at_ns, cue.released_at_ns);
     EXPECT_LE(cue.released_at_ns, cue.started_at_ns);
     EXPECT_LE(cue.started_at_ns, cue.finished_at_ns);
@@ -123,6 +127,34 @@ TEST_F(BehaviourLoopTest, CueCarriesInputsAndTimes) {
   ASSERT_EQ(stages.count.load(), 2u);
   EXPECT_EQ(stages.stages[0].histogram.count(), 1u);
   EXPECT_EQ(stages.stages[1].histogram.count(), 1u);
+}
+
+TEST_F(BehaviourLoopTest, SpecificForceIsTheMeanBetweenExposuresWithoutAGap) {
+  shm::RingWriter imu(flight_, shm::kImu);
+  const auto sense = [&](TimeNs at_ns, float accel_z_mps2) {
+    ImuSample sample;
+    sample.exposed_at_ns = at_ns;
+    sample.accel_body_mps2 = {0, 0, accel_z_mps2};
+    imu.write(sample, at_ns);
+  };
+  sense(5, 100);  // before the loop was made
+  with_loop(wiring(), [&] {
+    for (int i = 1; i <= 4; ++i) sense(10 * i, static_cast<float>(i));
+    publish_frame(1, 0, 20);
+    const Cue first = wait_for_cue();
+    EXPECT_EQ(first.accel_valid, 0u);  // nothing says since when
+    EXPECT_FLOAT_EQ(first.body.detail[2], -1.f);
+    sense(50, 5);
+    publish_frame(2, 0, 45);
+    const Cue second = wait_for_cue();
+    EXPECT_EQ(second.accel_valid, 1u);
+    EXPECT_FLOAT_EQ(second.body.detail[2], 3.5f);  // of 30 and 40
+    EXPECT_FLOAT_EQ(second.accel_body_mps2[2], 3.5f);
+    publish_frame(3, 0, 60);
+    EXPECT_FLOAT_EQ(wait_for_cue().body.detail[2], 5.f);
+    publish_frame(4, 0, 70);
+    EXPECT_EQ(wait_for_cue().accel_valid, 0u);  // nothing new
+  });
 }
 
 TEST_F(BehaviourLoopTest, AHeaderThatLiesIsNotFollowed) {
@@ -139,6 +171,8 @@ TEST_F(BehaviourLoopTest, ScriptSkipsFramesAndSuppliesAttitude) {
   script[1].frame_sequence = 3;
   script[1].attitude_valid = true;
   script[1].attitude.q_ned_body = {1, 0.5f, 0, 0};
+  script[1].accel_valid = true;
+  script[1].accel_body_mps2 = {0, 0, -9.5f};
   std::atomic<std::uint64_t> done{0};
   BehaviourWiring w = wiring();
   w.script = &script;
@@ -152,6 +186,8 @@ TEST_F(BehaviourLoopTest, ScriptSkipsFramesAndSuppliesAttitude) {
     EXPECT_EQ(second.frame_sequence, 3u);
     EXPECT_FLOAT_EQ(second.body.detail[0], 0.5f);
     EXPECT_FLOAT_EQ(second.body.detail[1], 2.f);
+    EXPECT_FLOAT_EQ(first.body.detail[2], -1.f);
+    EXPECT_FLOAT_EQ(second.body.detail[2], -9.5f);
   });
   EXPECT_EQ(done.load(), 3u);
 }

@@ -64,7 +64,7 @@ class ControlBench {
   explicit ControlBench(const BenchOptions& options)
       : instance_("test-control-" + std::to_string(getpid()) + "-" + std::to_string(count_++)),
         config_(configuration(options)),
-        flight_(create_flight_region(instance_, {"maker"}, false)),
+        flight_(create_flight_region(instance_, {.names = {"maker"}}, false)),
         port_(drivers::SerialEndpoint::parse(line_.endpoint())),
         autopilot_(drivers::LinkIdentity{}),
         cue_(flight_, shm::cue_topic("maker"), "Cue"),
@@ -166,6 +166,7 @@ class ControlBench {
  private:
   static Config configuration(const BenchOptions& o) {
     Config c = load_config({}, {"maker"});
+    c.behaviours[0].enabled = true;
     c.control_thread.overrun = o.overrun;
     c.control.arbiter.rows[0] = {o.cue_age_limit_ns, 0, 1.f, 1.f};
     c.control.attitude_age_limit_ns = o.attitude_age_limit_ns;
