@@ -72,6 +72,8 @@ struct RecordingBuilder {
     CameraGeometry& geometry = recording.geometry_;
     const Recording::Size size = recording.depth_size_.width_px > 0 ? recording.depth_size_ : recording.gray_size_;
     geometry.intrinsics = scaled(listing.intrinsics, size);
+    geometry.lens_kind = listing.lens_kind;
+    geometry.fisheye_k = listing.fisheye_k;
     geometry.R_body_cam = R_body_cam_from_pitch_down(listing.pitch_down.value_or(kAssumedPitchDown));
     geometry.position_body_m = listing.position_body_m;
     recording.pitch_down_ = listing.pitch_down;

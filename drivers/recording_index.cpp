@@ -35,14 +35,31 @@ double number(const toml::value& value, const std::string& key, const std::files
   return x;
 }
 
-Vec3 position(const toml::value& value, const std::filesystem::path& file) {
-  if (!value.is_array() || value.as_array().size() != 3)
-    throw std::runtime_error(file.string() + ": position_body_m is not an array of three numbers");
-  Vec3 out;
-  for (int i = 0; i < 3; ++i)
-    out[i] = static_cast<float>(
-        number(value.as_array()[static_cast<std::size_t>(i)], "position_body_m", file, -100.0, 100.0));
+template <std::size_t N>
+std::array<float, N> numbers(const toml::value& value, const std::string& key, const std::filesystem::path& file,
+                             double limit) {
+  if (!value.is_array() || value.as_array().size() != N)
+    throw std::runtime_error(file.string() + ": " + key + " is not an array of " + std::to_string(N) + " numbers");
+  std::array<float, N> out;
+  for (std::size_t i = 0; i < N; ++i)
+    out[i] = static_cast<float>(number(value.as_array()[i], key, file, -limit, limit));
   return out;
+}
+
+LensKind lens(const toml::value& value, const std::filesystem::path& file) {
+  const std::string name = value.is_string() ? value.as_string().str : "";
+  if (name != "pinhole" && name != "fisheye")
+    throw std::runtime_error(file.string() + ": lens is neither \"pinhole\" nor \"fisheye\"");
+  return name == "fisheye" ? LensKind::kFisheye : LensKind::kPinhole;
+}
+
+float* distortion_of(Intrinsics& k, const std::string& key) {
+  return key == "k1"   ? &k.k1
+         : key == "k2" ? &k.k2
+         : key == "p1" ? &k.p1
+         : key == "p2" ? &k.p2
+         : key == "k3" ? &k.k3
+                       : nullptr;
 }
 
 }  // namespace
@@ -122,6 +139,12 @@ void read_camera_toml(const std::filesystem::path& file, Listing& listing) {
       k.cx_px = real(number(value, key, file, -1e5, 1e5));
     else if (key == "cy_px")
       k.cy_px = real(number(value, key, file, -1e5, 1e5));
+    else if (float* distortion = distortion_of(k, key))
+      *distortion = real(number(value, key, file, -10, 10));
+    else if (key == "lens")
+      listing.lens_kind = lens(value, file);
+    else if (key == "fisheye_k")
+      listing.fisheye_k = numbers<4>(value, key, file, 10);
     else if (key == "pitch_down_deg")
       listing.pitch_down = to_radians(Degrees{number(value, key, file, -90, 90)});
     else if (key == "depth_units_per_m")
@@ -129,7 +152,7 @@ void read_camera_toml(const std::filesystem::path& file, Listing& listing) {
     else if (key == "rate_hz")
       listing.nominal_rate_hz = number(value, key, file, 0.01, 10000);
     else if (key == "position_body_m")
-      listing.position_body_m = position(value, file);
+      listing.position_body_m = Vec3(numbers<3>(value, key, file, 100).data());
     else
       throw std::runtime_error(file.string() + ":" + std::to_string(value.location().line()) + ": unknown key '" + key +
                                "'");

@@ -25,6 +25,8 @@ struct Listing {
   std::vector<ListedFrame> frames{};    ///< in the order of the recording
   std::vector<std::string> problems{};  ///< lines that could not be read
   Intrinsics intrinsics{};              ///< for 640x480 unless the layout says otherwise
+  LensKind lens_kind = LensKind::kPinhole;
+  std::array<float, 4> fisheye_k{};
   std::optional<Radians> pitch_down{};
   Vec3 position_body_m = Vec3::Zero();
   double nominal_rate_hz = 30.0;

@@ -80,7 +80,7 @@ void RecordSession::write_account(const std::string& reason) const {
   nlohmann::json topics = nlohmann::json::array(), events = nlohmann::json::array();
   for (const auto& [key, c] : counts_) {
     std::uint64_t failed = 0;
-    if (pool_ && c.type == "Frame") failed = pool_->failed(c.topic == "depth" ? *depth_ : *rgb_);
+    if (pool_ && c.type == "Frame" && keeps(c)) failed = pool_->failed(c.topic == "depth" ? *depth_ : *rgb_);
     topics.push_back({{"region", c.region},
                       {"topic", c.topic},
                       {"type", c.type},
@@ -90,7 +90,7 @@ void RecordSession::write_account(const std::string& reason) const {
                       {"rejected", c.rejected},
                       {"refused_by_disk", failed},
                       {"polls_with_queue_full", c.queue_full},
-                      {"kept", c.type != "Frame" || options_.frames}});
+                      {"kept", keeps(c)}});
   }
   for (const auto& e : events_) events.push_back({{"at_ns", e.at_ns}, {"region", e.region}, {"what", e.what}});
   replace_file(log("record.json"), text_of({{"instance", options_.instance},

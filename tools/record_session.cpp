@@ -110,12 +110,19 @@ void RecordSession::follow(Source& source, TopicCount& count, Start start) {
                              const Cue& cue, const RingStamp& stamp) { return csv_row(cue, stamp, name); }));
   else if (count.type == "Frame")
     follow_frames(source, count, start);
-  else
+  else if (count.type != "Flow")
     note(region.name(), "topic '" + count.topic + "' of unknown type '" + count.type + "' is not recorded");
 }
 
+/// Frames when asked for, of the front camera: what a replay can show. Flow fields never: a replay makes them anew, to
+/// the bit, from the frames. record.json says so of each topic.
+bool RecordSession::keeps(const TopicCount& count) const {
+  if (count.type == "Flow") return false;
+  return count.type != "Frame" || (options_.frames && (count.topic == shm::kGray || count.topic == shm::kDepth));
+}
+
 void RecordSession::follow_frames(Source& source, TopicCount& count, Start start) {
-  if (!options_.frames || (count.topic != shm::kGray && count.topic != shm::kDepth)) return;
+  if (!keeps(count)) return;
   ImageStream& stream = count.topic == shm::kDepth ? *depth_ : *rgb_;
   auto follower = std::make_shared<FrameFollower>(*source.attachment.region(), start, *pool_, stream, count);
   source.drains.push_back([this, follower] {

@@ -58,6 +58,7 @@ class RecordSession {
 
   void attach(Source& source);
   void follow(Source& source, TopicCount& count, Start start);
+  [[nodiscard]] bool keeps(const TopicCount& count) const;
   void follow_frames(Source& source, TopicCount& count, Start start);
   bool drain(Source& source);
   void let_go(Source& source);

@@ -57,7 +57,8 @@ TEST_F(RecordingFolder, ReadsWaspsOwnLayoutWithCameraAndSequenceNumbers) {
   text("rgb.txt", "1700000000.000000001 rgb/frame-7.png\n");
   text("camera.toml",
        "width_px = 32\nheight_px = 24\nfx_px = 26.0\nfy_px = 27\ncx_px = 15.5\ncy_px = 11.5\npitch_down_deg = 30.0\n"
-       "depth_units_per_m = 1000\nposition_body_m = [0.1, 0.0, -0.05]\n");
+       "depth_units_per_m = 1000\nposition_body_m = [0.1, 0.0, -0.05]\n"
+       "k2 = 0.5\nlens = \"fisheye\"\nfisheye_k = [0.1, 0.2, 0, -0.4]\n");
   const Recording r = Recording::open(folder);
   EXPECT_EQ(r.layout(), "tum");
   ASSERT_EQ(r.entries().size(), 2u);
@@ -69,6 +70,9 @@ TEST_F(RecordingFolder, ReadsWaspsOwnLayoutWithCameraAndSequenceNumbers) {
   EXPECT_FLOAT_EQ(r.intrinsics().fy_px, 27.f);
   EXPECT_NEAR(r.pitch_down()->value, 0.5236, 1e-4);
   EXPECT_FLOAT_EQ(r.geometry().position_body_m.x(), 0.1f);
+  EXPECT_FLOAT_EQ(r.intrinsics().k2, 0.5f);
+  EXPECT_EQ(r.geometry().lens_kind, LensKind::kFisheye);
+  EXPECT_FLOAT_EQ(r.geometry().fisheye_k[3], -0.4f);
   EXPECT_EQ(first_depth(r, 0), 1234);
   EXPECT_EQ(first_depth(r, 1), 0);  // 65535 means no reading
   std::vector<std::uint8_t> pixels(r.gray_size().pixels());
@@ -110,6 +114,8 @@ TEST_F(RecordingFolder, ErrorsSayWhatIsWrong) {
   text("depth.txt", "1.0 depth/a.png\n");
   text("camera.toml", "fx_px = 500\nbogus = 1\n");
   EXPECT_NE(error().find("camera.toml:2: unknown key 'bogus'"), std::string::npos) << error();
+  text("camera.toml", "lens = \"mirror\"\n");
+  EXPECT_NE(error().find("camera.toml: lens is neither"), std::string::npos) << error();
   text("camera.toml", "fx_px = \"wide\"\n");
   EXPECT_NE(error().find("camera.toml:1"), std::string::npos) << error();
   text("camera.toml", "fx_px = = 3\n");
