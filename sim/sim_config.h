@@ -8,17 +8,27 @@
 
 #include "sim/imu_model.h"
 #include "sim/lab_world.h"
+#include "sim/optics.h"
 #include "sim/sensor_model.h"
 #include "types/camera.h"
 
 namespace wasp::sim {
+
+/// A second camera, grey only. Its image's top points to the vehicle's front.
+struct DownCamera {
+  bool enabled = false;
+  double rate_hz = 30;  ///< 1 ... 120
+  CameraSetup setup;
+};
 
 struct SimConfig {
   std::uint32_t seed = 1;
   bool safety_pilot = true;
   double clock_offset_s = 1000.25;  ///< autopilot clock minus the simulator's, 0 ... 1e6
   double camera_rate_hz = 30;       ///< 1 ... 120
-  CameraGeometry camera;
+  CameraGeometry camera;            ///< the front one
+  OpticsParams optics;              ///< of the front camera
+  DownCamera down;
   VehicleParams vehicle;
   ImuParams imu;
   SensorParams sensor;
@@ -26,8 +36,11 @@ struct SimConfig {
   int cartons = 9;
   std::string world_file;  ///< VRML97 to fly in instead of the laboratory; empty: the laboratory
 
-  /// The Kinect of the thesis: 640 x 480, f = 525 px, pitched down by 30 degrees, 5 cm ahead of the centre of mass.
+  /// The Kinect of the thesis: 640 x 480, f = 525 px, pitched down by 30 degrees, 5 cm ahead of the centre of mass; and
+  /// a fisheye of 170 degrees, 320 x 240, below it that looks straight down (not enabled).
   SimConfig();
+
+  [[nodiscard]] CameraSetup front() const { return {camera, optics}; }
 };
 
 /// Reads a TOML file over the defaults. Throws std::runtime_error naming the file and the key or line.

@@ -39,7 +39,9 @@ void Simulator::control_tick() {
 }
 
 BodyPose Simulator::pose() const {
-  return {now_ns_, vehicle_.state().position_ned_m.cast<float>(), vehicle_.state().q_ned_body.cast<float>()};
+  const VehicleState& s = vehicle_.state();
+  return {now_ns_, s.position_ned_m.cast<float>(), s.q_ned_body.cast<float>(), s.velocity_ned_mps.cast<float>(),
+          s.rate_body_radps.cast<float>()};
 }
 
 Truth Simulator::truth() const {
