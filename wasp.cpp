@@ -1,4 +1,5 @@
-// The table of contents: config -> shared memory -> drivers -> thread table -> run.
+// The table of contents: config -> shared memory -> drivers -> thread table -> run. The behaviours are listed in
+// behaviours.cpp.
 //
 // `wasp flight` is the flying process, alone in this binary so that it stays lean; every other subcommand is a program
 // of its own beside it (`wasp top` runs `wasp-top`).
@@ -10,21 +11,14 @@
 #include <filesystem>
 #include <string>
 
+#include "behaviours.h"
 #include "rt/contract.h"
 #include "scheduling/flight.h"
 #include "scheduling/plan.h"
-#include "vision/edge_altitude.h"
-#include "vision/ground_altitude.h"
 
 namespace {
 
 using namespace wasp;
-
-// A new behaviour is one file pair in vision/, one row here, and one section in config/wasp.toml.
-const scheduling::BehaviourTable kBehaviours = {
-    scheduling::behaviour_row<vision::GroundAltitude>(),
-    scheduling::behaviour_row<vision::EdgeAltitude>(),
-};
 
 constexpr const char* kUsage =
     "usage: wasp SUBCOMMAND [options]    (wasp SUBCOMMAND --help for each)\n"
@@ -60,7 +54,7 @@ int main(int argc, char** argv) {
     std::fputs(kUsage, argc < 2 ? stderr : stdout);
     return argc < 2 ? 2 : 0;
   }
-  if (std::strcmp(argv[1], "flight") == 0) return scheduling::flight_main(kBehaviours, argc - 1, argv + 1);
-  if (std::strcmp(argv[1], "plan") == 0) return scheduling::plan_main(kBehaviours, argc - 1, argv + 1);
+  if (std::strcmp(argv[1], "flight") == 0) return scheduling::flight_main(all_behaviours(), argc - 1, argv + 1);
+  if (std::strcmp(argv[1], "plan") == 0) return scheduling::plan_main(all_behaviours(), argc - 1, argv + 1);
   return run_sister(argv[1], argv + 1);
 }

@@ -1,5 +1,5 @@
 // The adaptor, written once: waits for a frame, calls `step`, publishes the cue, records latency and overruns. A new
-// behaviour is one file pair in vision/ and one row in wasp.cpp.
+// behaviour is one file pair in vision/ and one row in behaviours.cpp.
 #pragma once
 
 #include <atomic>
@@ -32,6 +32,7 @@ class BehaviourLoop {
  public:
   BehaviourLoop(const typename B::Params& params, const BehaviourWiring& wiring)
       : params_(params),
+        state_(make_state<B>(params)),
         wiring_(wiring),
         frames_(*wiring.camera, B::kStream),
         attitude_(*wiring.flight, shm::kAttitude, "Attitude"),
@@ -125,7 +126,7 @@ class BehaviourLoop {
   }
 
   typename B::Params params_;
-  typename B::State state_{};
+  typename B::State state_;
   BehaviourWiring wiring_;
   FrameSource frames_;
   shm::RingReader attitude_;

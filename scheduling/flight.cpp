@@ -253,12 +253,6 @@ int check_rights(int priority) {
 
 }  // namespace
 
-std::vector<std::string> names_of(const BehaviourTable& table) {
-  std::vector<std::string> names;
-  for (const auto& row : table) names.push_back(row.name);
-  return names;
-}
-
 int flight_main(const BehaviourTable& behaviours, int argc, char** argv) {
   FlightOptions options;
   if (const auto code = parse_flight_options(argc, argv, options)) return *code;

@@ -1,7 +1,7 @@
 // `wasp plan`: the thread table of a configuration, analysed and drawn, without flying.
 #pragma once
 
-#include "scheduling/flight.h"
+#include "scheduling/behaviour_row.h"
 
 namespace wasp::scheduling {
 

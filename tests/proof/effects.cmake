@@ -27,7 +27,7 @@ endfunction()
 file(GLOB_RECURSE sources CONFIGURE_DEPENDS RELATIVE ${CMAKE_SOURCE_DIR} ${CMAKE_SOURCE_DIR}/rt/*.cpp
   ${CMAKE_SOURCE_DIR}/shm/*.cpp ${CMAKE_SOURCE_DIR}/messages/*.cpp ${CMAKE_SOURCE_DIR}/drivers/*.cpp
   ${CMAKE_SOURCE_DIR}/vision/*.cpp ${CMAKE_SOURCE_DIR}/control/*.cpp ${CMAKE_SOURCE_DIR}/scheduling/*.cpp)
-foreach(source ${sources} wasp.cpp)
+foreach(source ${sources} behaviours.cpp wasp.cpp)
   check_effects(${source} narrow)
   file(STRINGS ${CMAKE_SOURCE_DIR}/${source} vectors REGEX "hwy/highway.h")
   # Highway's Reverse for AVX2 keeps its constants in a static table, which clang takes for a guarded one.
