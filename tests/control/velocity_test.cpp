@@ -55,7 +55,7 @@ TEST(VelocityHold, ReachesTheSpeedAgainstWindAndDragWithoutMuchOvershoot) {
 TEST(VelocityHold, StopsASidewaysDrift) {
   Flight f;
   f.truth.right = 0.8f;
-  for (int i = 0; i < 80; ++i) f.tick(0.f);
+  for (int i = 0; i < 120; ++i) f.tick(0.f);
   EXPECT_NEAR(f.truth.right, 0.f, 0.05f);
 }
 
