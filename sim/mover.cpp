@@ -9,7 +9,8 @@ MoverPlace Mover::at(double t_s) const {
   const double cycle_s = static_cast<double>(keys.back().at_s);
   double t = std::max(t_s, 0.0);
   if (looped && cycle_s > 0) t = std::fmod(t, cycle_s);
-  const auto after = std::find_if(keys.begin(), keys.end(), [t](const MoverKey& k) { return k.at_s > t; });
+  const auto after =
+      std::find_if(keys.begin(), keys.end(), [t](const MoverKey& k) { return static_cast<double>(k.at_s) > t; });
   if (after == keys.begin()) return keys.front().place;
   if (after == keys.end()) return keys.back().place;
   const MoverKey &a = *(after - 1), &b = *after;

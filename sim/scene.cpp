@@ -57,8 +57,7 @@ const SceneKind* find_scene_kind(const std::string& kind) {
 
 Scene make_scene(const std::string& kind, const SceneOptions& options) {
   const SceneKind* known = find_scene_kind(kind);
-  if (known == nullptr)
-    throw std::runtime_error("no kind of world '" + kind + "'; known: " + scene_kind_names());
+  if (known == nullptr) throw std::runtime_error("no kind of world '" + kind + "'; known: " + scene_kind_names());
   return known->make(options);
 }
 

@@ -63,13 +63,13 @@ Scene make_arena(std::uint32_t seed, const ArenaStep& step);
 
 /// The low city: boxes on a square grid, each within its own cell.
 struct CityOptions {
-  double length_m = 70, half_width_m = 26;        ///< along x; to either side
-  double free_before_m = 6, free_after_m = 8;     ///< no boxes within these of the ends
-  double pitch_m = 3;                             ///< of the grid; a box fills 72 to 92 % of it each way
-  double mean_low_m = 0.6, mean_high_m = 2;       ///< of the exponential, where the sinusoid is low and high
-  double period_m = 25;                           ///< of the sinusoid along x
-  double lowest_m = 0.3, tallest_m = 4;           ///< heights are cut to these
-  double windowed = 0.3;                          ///< share of boxes with windows
+  double length_m = 70, half_width_m = 26;     ///< along x; to either side
+  double free_before_m = 6, free_after_m = 8;  ///< no boxes within these of the ends
+  double pitch_m = 3;                          ///< of the grid; a box fills 72 to 92 % of it each way
+  double mean_low_m = 0.6, mean_high_m = 2;    ///< of the exponential, where the sinusoid is low and high
+  double period_m = 25;                        ///< of the sinusoid along x
+  double lowest_m = 0.3, tallest_m = 4;        ///< heights are cut to these
+  double windowed = 0.3;                       ///< share of boxes with windows
 };
 
 /// The start lies up to 1.5 m north of the edge of the map and up to 8 m to either side, from the seed.

@@ -43,7 +43,8 @@ Scene make_city(std::uint32_t seed, const CityOptions& o) {
   Random random(mix(seed, 21));
   World world = empty_world(seed);
   world.sky = 215;
-  world.add_quad({kBehind_m, -kSide_m, 0}, {o.length_m + 40, 0, 0}, {0, 2 * kSide_m, 0}, {kSoft, 3.f, 0.9f});
+  world.add_quad({kBehind_m, -kSide_m, 0}, {static_cast<float>(o.length_m) + 40, 0, 0}, {0, 2 * kSide_m, 0},
+                 {kSoft, 3.f, 0.9f});
   const double phase = random.uniform(0, 2 * std::numbers::pi);
   for (double x = o.free_before_m + o.pitch_m / 2; x < o.length_m - o.free_after_m; x += o.pitch_m)
     for (double y = o.pitch_m / 2; y < o.half_width_m; y += o.pitch_m) {

@@ -113,8 +113,8 @@ Scene make_corridor_obstacles(std::uint32_t seed) {
   return b.finish("corridor-obstacles");
 }
 
-/// Cartons keep to one wall, people to the other, so that at least 1.2 m stay free between them. Each walks a half of the
-/// corridor to and fro: one comes along the vehicle's way first, the other towards it.
+/// Cartons keep to one wall, people to the other, so that at least 1.2 m stay free between them. Each walks a half of
+/// the corridor to and fro: one comes along the vehicle's way first, the other towards it.
 Scene make_corridor_people(std::uint32_t seed) {
   Builder b = straight(seed);
   const float side = b.between(0, 1) < 0.5f ? -1.f : 1.f;
@@ -124,9 +124,10 @@ Scene make_corridor_people(std::uint32_t seed) {
   }
   const float lane = -side * (kW / 2 - 0.1f - kWalkerWidth_m / 2), inwards = side * std::numbers::pi_v<float> / 2;
   for (const bool first : {true, false})
-    add_walker(b.world(), first ? "walker_near" : "walker_far",
-               {first ? 4.f : 15.f, first ? 14.f : 27.f, lane, b.between(0.4, 0.8), b.between(0.2, 0.8), first, inwards},
-               b.random());
+    add_walker(
+        b.world(), first ? "walker_near" : "walker_far",
+        {first ? 4.f : 15.f, first ? 14.f : 27.f, lane, b.between(0.4, 0.8), b.between(0.2, 0.8), first, inwards},
+        b.random());
   return b.finish("corridor-people");
 }
 

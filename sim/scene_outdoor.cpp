@@ -89,7 +89,7 @@ ArenaStep arena_step_of(std::uint32_t seed, double at_s) {
 /// The upper, dark part hangs just inside the light wall and moves as a whole; its own top stays out of sight.
 Scene make_arena(std::uint32_t seed, const ArenaStep& step) {
   World world = empty_world(seed);
-  add_ground(world, 8, {kSoft, 2.f, 0.85f});
+  add_ground(world, 8, {kSoft, 2.f, 1.4f});
   add_drum(world, kArenaRadius_m, 0, kArenaHeight_m, {kSoft, 2.f, 1.3f});
   const auto edge_at = [](float height_m) { return MoverPlace{Vec3(0, 0, -height_m), 0}; };
   std::vector<MoverKey> keys{{0, edge_at(step.from_m)}};

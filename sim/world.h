@@ -1,6 +1,7 @@
 // A world as the renderer wants it: planar quads, each with a surface (texture, its axes, brightness). Light is one
 // lamp direction plus ambient, so a planar surface has one brightness, worked out when it is added. World coordinates
-// are NED with the floor at z = 0 [m]. Quads of a moving part are in its own frame and follow all those that stand still.
+// are NED with the floor at z = 0 [m]. Quads of a moving part are in its own frame and follow all those that stand
+// still.
 #pragma once
 
 #include <array>
