@@ -111,7 +111,7 @@ Setpoint wanted_setpoint(const ControlParams& p, const ControlInput& in, const I
     s.velocity_hold = VelocityHoldState{};
     return wanted;
   }
-  const bool moving = p.velocity_hold.enabled && known(p.velocity_filter, s.velocity, in.now_ns);
+  const bool moving = known(p.velocity_filter, s.velocity, in.now_ns);
   const Tilt tilt = velocity_hold_step(p.velocity_hold, forward_mps, moving, s.velocity.velocity_mps, in.dt_s, s.velocity_hold);
   const float pitch_wish = wish.steer ? intention.pitch_rad : 0.f;
   const bool avoiding = intention.avoid || (s.avoid_until_ns != kNever && in.now_ns < s.avoid_until_ns);
@@ -216,7 +216,7 @@ ControlOutput control_step(const ControlParams& p, const ControlInput& in, Contr
   if (known(p.velocity_filter, s.velocity, in.now_ns)) {
     c.velocity_forward_mps = s.velocity.velocity_mps.forward;
     c.velocity_right_mps = s.velocity.velocity_mps.right;
-    c.velocity_held = p.velocity_hold.enabled ? 1 : 0;
+    c.velocity_held = p.velocity_hold.hold != VelocityHold::kOff ? 1 : 0;
   }
   c.avoid = intention.avoid ? 1 : 0;
   c.mission_phase = static_cast<std::uint8_t>(s.mission.phase);

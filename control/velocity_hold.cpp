@@ -20,7 +20,7 @@ float axis(const VelocityHoldParams& p, float error, float dt_s, float& integral
 
 Tilt velocity_hold_step(const VelocityHoldParams& p, float forward_mps, bool is_known, LevelVelocity measured,
                         float dt_s, VelocityHoldState& s) noexcept {
-  if (!is_known) {
+  if (!is_known || p.hold == VelocityHold::kOff) {
     s = VelocityHoldState{};
     return {};
   }
@@ -30,7 +30,7 @@ Tilt velocity_hold_step(const VelocityHoldParams& p, float forward_mps, bool is_
                                                          p.ramp_mps2 * dt_s);
   const float ahead = axis(p, s.setpoint_mps - measured.forward, dt_s, s.integral_mps2.forward);
   const float right = axis(p, -measured.right, dt_s, s.integral_mps2.right);
-  return {std::atan2(right, kGravity_mps2), -std::atan2(ahead, kGravity_mps2)};
+  return {std::atan2(right, kGravity_mps2), p.hold == VelocityHold::kBoth ? -std::atan2(ahead, kGravity_mps2) : 0.f};
 }
 
 }  // namespace wasp::control

@@ -2,13 +2,18 @@
 // vehicle is held at rest, so that steering by heading alone does not skid from wall to wall.
 #pragma once
 
+#include <cstdint>
+
 #include "control/velocity_filter.h"
 #include "types/realtime.h"
 
 namespace wasp::control {
 
+/// What is held: nothing, the way to the sides alone (behaviours pitch for speed), or both.
+enum class VelocityHold : std::uint8_t { kOff, kSideways, kBoth };
+
 struct VelocityHoldParams {
-  bool enabled = false;
+  VelocityHold hold = VelocityHold::kOff;
   float kp_1ps = 1.4f;             ///< [1/s]
   float ki_1ps2 = 0.35f;           ///< [1/s^2]
   float max_accel_mps2 = 1.7f;     ///< of the command: 10 degrees of tilt

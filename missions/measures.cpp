@@ -120,7 +120,7 @@ YawRates yaw_rates(const FlightTrace& trace, const std::string& behaviour) {
       sum += static_cast<double>(trace.imu[j].gyro_body_radps[2]);
     if (c.body.validity != Validity::kValid || n == 0 || c.exposed_at_ns - from_ns > 100 * kMillisecond) continue;
     const double t = trace.seconds(c.exposed_at_ns);
-    out.visual.add(t, static_cast<double>(c.body.detail[vision::HeadingRate::kYawRate_radps]));
+    out.visual.add(t, static_cast<double>(c.body.detail[vision::HeadingDetail::kYawRate_radps]));
     out.gyro.add(t, sum / n);
   }
   return out;

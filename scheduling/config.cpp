@@ -129,7 +129,7 @@ void read_mission(TomlTable t, control::MissionParams& m) {
 
 void read_velocity(TomlTable& t, control::ControlParams& p) {
   auto& hold = p.velocity_hold;
-  t.flag("velocity_hold", hold.enabled);
+  read_choice(t, "velocity_hold", hold.hold, {"off", "sideways", "both"});
   t.number("velocity_kp_1ps", hold.kp_1ps, 0, 10);
   t.number("velocity_ki_1ps2", hold.ki_1ps2, 0, 10);
   t.number("velocity_max_accel_mps2", hold.max_accel_mps2, 0.1, 5);

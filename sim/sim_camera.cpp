@@ -9,8 +9,7 @@ namespace wasp::sim {
 namespace {
 
 World world_of(const SimConfig& config) {
-  if (!config.world_file.empty()) return placed_at_start(read_vrml(config.world_file));
-  return make_lab({config.seed, config.floor_edges_per_m, config.cartons});
+  return placed_at_start(config.world_file.empty() ? generated_scene(config) : read_vrml(config.world_file));
 }
 
 }  // namespace

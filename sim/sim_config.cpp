@@ -26,6 +26,14 @@ struct Row {
   std::vector<std::string> words = {};  ///< names of 0, 1, ...; empty: the value is a number
 };
 
+/// A key whose value is a word: `set` gives false when it is none of `words`.
+struct WordRow {
+  const char* section;
+  const char* key;
+  std::function<std::string()> words;  ///< what is allowed, for messages
+  std::function<bool(Draft&, const std::string&)> set;
+};
+
 template <class Number>
 Row row(const char* section, const char* key, double low, double high, Number& (*where)(Draft&)) {
   return {section, key, low, high, [where](Draft& d, double value) { where(d) = static_cast<Number>(value); }};
@@ -122,8 +130,12 @@ std::vector<Row> make_rows() {
       row<float>("sensor", "gain", 0.01, 20, [](D& d) -> float& { return d.config.sensor.gain; }),
       row<float>("sensor", "read_noise", 0, 100, [](D& d) -> float& { return d.config.sensor.read_noise; }),
       row<float>("sensor", "photon_noise", 0, 10, [](D& d) -> float& { return d.config.sensor.photon_noise; }),
-      row<double>("world", "floor_edges_per_m", 0.05, 20, [](D& d) -> double& { return d.config.floor_edges_per_m; }),
-      row<int>("world", "cartons", 0, 40, [](D& d) -> int& { return d.config.cartons; }),
+      row<double>("world", "floor_edges_per_m", 0.05, 20, [](D& d) -> double& { return d.config.world.floor_edges_per_m; }),
+      row<int>("world", "cartons", 0, 40, [](D& d) -> int& { return d.config.world.cartons; }),
+      row<double>("world", "ground_edges_per_m", 0.02, 20,
+          [](D& d) -> double& { return d.config.world.ground_edges_per_m; }),
+      row<double>("world", "arena_step_at_s", 0, 600,
+          [](D& d) -> double& { return d.config.world.arena_step_at_s; }),
   };
   // clang-format on
   add_camera_rows(rows, "camera", front_of);
@@ -133,6 +145,17 @@ std::vector<Row> make_rows() {
 
 const std::vector<Row>& rows() {
   static const std::vector<Row> kRows = make_rows();
+  return kRows;
+}
+
+const std::vector<WordRow>& word_rows() {
+  static const std::vector<WordRow> kRows{
+      {"world", "kind", &scene_kind_names,
+       [](Draft& d, const std::string& word) {
+         d.config.world_kind = word;
+         return find_scene_kind(word) != nullptr;
+       }},
+  };
   return kRows;
 }
 
@@ -156,9 +179,24 @@ double word_of(const toml::value& value, const Row& row, const std::string& name
   fail(name, "'" + key + "' is none of " + allowed);
 }
 
+/// False when the key is not one that takes a word.
+bool apply_word(Draft& draft, const std::string& section, const std::string& key, const toml::value& value,
+                const std::string& name) {
+  for (const WordRow& r : word_rows()) {
+    if (r.section != section || r.key != key) continue;
+    const std::string full = "'" + section + "." + key + "'";
+    if (!value.is_string()) fail(name, full + " is not a word in quotes; known: " + r.words());
+    const std::string word = value.as_string();
+    if (!r.set(draft, word)) fail(name, full + " is \"" + word + "\"; known: " + r.words());
+    return true;
+  }
+  return false;
+}
+
 void apply(Draft& draft, const std::string& section, const std::string& key, const toml::value& value,
            const std::string& name) {
   const std::string full = section + "." + key;
+  if (apply_word(draft, section, key, value, name)) return;
   for (const Row& r : rows()) {
     if (r.section != section || r.key != key) continue;
     const double number = r.words.empty() ? number_of(value, name, full) : word_of(value, r, name, full);
@@ -213,6 +251,12 @@ SimConfig::SimConfig() {
   down.setup.optics.field_of_view_rad = static_cast<float>(to_radians(Degrees{170}).value);
 }
 
+Scene generated_scene(const SimConfig& config) {
+  SceneOptions options = config.world;
+  options.seed = config.seed;
+  return make_scene(config.world_kind, options);
+}
+
 SimConfig parse_sim_config(const std::string& toml_text, const std::string& name) {
   std::istringstream stream(toml_text);
   toml::value document;
@@ -244,6 +288,7 @@ SimConfig load_sim_config(const std::string& path) {
 std::vector<std::string> sim_config_keys() {
   std::vector<std::string> keys;
   for (const Row& r : rows()) keys.push_back(std::string(r.section) + "." + r.key);
+  for (const WordRow& r : word_rows()) keys.push_back(std::string(r.section) + "." + r.key);
   return keys;
 }
 

@@ -21,6 +21,7 @@ struct View {
   double yaw_deg = 0, pitch_down_deg = 0;
   int width_px = 640, height_px = 480;
   double field_of_view_deg = 75;
+  double at_s = 0;  ///< after the vehicle first left the ground
 };
 
 /// Grey picture seen from the start (heading 0) or wherever `view` says.
@@ -29,7 +30,7 @@ drivers::Image<std::uint8_t> draw(const Scene& scene, const View& view) {
   const double half_rad = to_radians(Degrees{view.field_of_view_deg / 2}).value;
   k.fx_px = k.fy_px = static_cast<float>(0.5 * view.width_px / std::tan(half_rad));
   k.cx_px = 0.5f * static_cast<float>(view.width_px - 1), k.cy_px = 0.5f * static_cast<float>(view.height_px - 1);
-  const Renderer renderer(placed_at_start(scene), k);
+  const Renderer renderer(placed_at_start(scene).at(view.at_s), k);
   const Mat3 R_yaw =
       Eigen::AngleAxisf(static_cast<float>(to_radians(Degrees{view.yaw_deg}).value), Vec3::UnitZ()).toRotationMatrix();
   const CameraPose pose{Vec3(view.eye[0], view.eye[1], -view.eye[2]),
@@ -85,6 +86,9 @@ int main(int argc, char** argv) {
   show->add_option("--pitch-down-deg", view.pitch_down_deg, "90: straight down")->capture_default_str();
   show->add_option("--fov-deg", view.field_of_view_deg, "across the picture")
       ->check(CLI::Range(10.0, 140.0))
+      ->capture_default_str();
+  show->add_option("--at-s", view.at_s, "moving parts as they are this long after the vehicle first left the ground")
+      ->check(CLI::Range(0.0, 1e6))
       ->capture_default_str();
   CLI11_PARSE(app, argc, argv);
   try {

@@ -15,7 +15,7 @@ constexpr TimeNs kDt_ns = 50 * kMillisecond;
 /// A point mass flown through filter and hold; velocities are seen `delay` ticks late.
 struct Flight {
   VelocityFilterParams filter;
-  VelocityHoldParams hold{.enabled = true};
+  VelocityHoldParams hold{.hold = VelocityHold::kBoth};
   VelocityFilterState estimate;
   VelocityHoldState state;
   LevelVelocity truth, tilt_accel;
@@ -70,7 +70,7 @@ TEST(VelocityHold, BrakesWithoutARamp) {
 TEST(VelocityHold, IsLevelWhileNobodyKnowsTheVelocity) {
   VelocityHoldState s;
   s.integral_mps2.forward = 0.5f;
-  const Tilt t = velocity_hold_step({.enabled = true}, 1.f, false, {}, kDt_s, s);
+  const Tilt t = velocity_hold_step({.hold = VelocityHold::kBoth}, 1.f, false, {}, kDt_s, s);
   EXPECT_EQ(t.roll_rad, 0.f);
   EXPECT_EQ(t.pitch_rad, 0.f);
   EXPECT_EQ(s.integral_mps2.forward, 0.f);
