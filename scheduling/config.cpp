@@ -1,8 +1,11 @@
 #include "scheduling/config.h"
 
-#include <numbers>
+#include <fmt/format.h>
 
+#include <numbers>
+#include <span>
 #include <sstream>
+#include <utility>
 
 #include "scheduling/default_config.h"
 
@@ -59,23 +62,43 @@ void read_autopilot(TomlTable t, Config& c) {
   t.finish();
 }
 
-void read_camera(TomlTable t, Config& c) {
-  t.text_value("driver", c.camera_driver, {"sim", "replay"});
-  Intrinsics& k = c.camera.intrinsics;
+void read_vector(TomlTable& t, const char* key, std::span<float> out, double low, double high) {
+  std::vector<double> numbers;
+  t.numbers(key, numbers, low, high);
+  if (!numbers.empty() && numbers.size() != out.size())
+    throw ConfigError(fmt::format("'{}' needs {} numbers", key, out.size()));
+  for (std::size_t i = 0; i < numbers.size(); ++i) out[i] = static_cast<float>(numbers[i]);
+}
+
+/// Lens and mount of either camera. Angles are degrees in the file only.
+void read_geometry(TomlTable& t, CameraGeometry& camera, double& pitch_down_deg) {
+  Intrinsics& k = camera.intrinsics;
   t.number("width_px", k.width_px, 16, 8192);
   t.number("height_px", k.height_px, 16, 8192);
-  t.number("rate_hz", c.camera_rate_hz, 1, 1000);
   t.number("fx_px", k.fx_px, 1, 1e5);
   t.number("fy_px", k.fy_px, 1, 1e5);
   t.number("cx_px", k.cx_px, -1e4, 1e5);
   t.number("cy_px", k.cy_px, -1e4, 1e5);
-  t.number("pitch_down_deg", c.camera_pitch_down_deg, -90, 90);
-  c.camera.R_body_cam = R_body_cam_from_pitch_down(to_radians(Degrees{c.camera_pitch_down_deg}));
-  std::vector<double> position;
-  t.numbers("position_body_m", position, -10, 10);
-  if (!position.empty() && position.size() != 3) throw ConfigError("camera.position_body_m needs three numbers");
-  for (std::size_t i = 0; i < position.size(); ++i)
-    c.camera.position_body_m[static_cast<Eigen::Index>(i)] = static_cast<float>(position[i]);
+  for (const auto& [key, value] : {std::pair{"k1", &k.k1}, {"k2", &k.k2}, {"p1", &k.p1}, {"p2", &k.p2}, {"k3", &k.k3}})
+    t.number(key, *value, -10, 10);
+  read_choice(t, "lens", camera.lens_kind, {"pinhole", "fisheye"});
+  read_vector(t, "fisheye_k", camera.fisheye_k, -10, 10);
+  t.number("pitch_down_deg", pitch_down_deg, -90, 90);
+  camera.R_body_cam = R_body_cam_from_pitch_down(to_radians(Degrees{pitch_down_deg}));
+  read_vector(t, "position_body_m", {camera.position_body_m.data(), 3}, -10, 10);
+}
+
+void read_camera(TomlTable t, Config& c) {
+  t.text_value("driver", c.camera_driver, {"sim", "replay"});
+  t.number("rate_hz", c.camera_rate_hz, 1, 1000);
+  read_geometry(t, c.camera, c.camera_pitch_down_deg);
+  t.finish();
+}
+
+void read_camera_down(TomlTable t, DownCameraConfig& c) {
+  t.flag("enabled", c.enabled);
+  t.number("rate_hz", c.rate_hz, 1, 1000);
+  read_geometry(t, c.geometry, c.pitch_down_deg);
   t.finish();
 }
 
@@ -177,6 +200,7 @@ void read_behaviours(TomlTable t, Config& c, bool foreign_behaviours) {
   for (std::size_t i = 0; i < c.behaviours.size(); ++i) {
     TomlTable b = t.table(c.behaviours[i].name.c_str());
     control::ArbiterRow& row = c.control.arbiter.rows[i];
+    b.flag("enabled", c.behaviours[i].enabled);
     read_thread(b, c.behaviours[i]);
     read_choice(b, "frames", c.behaviours[i].frames_in_order, {"newest", "in_order"});
     read_milliseconds(b, "age_limit_ms", row.age_limit_ns);
@@ -209,6 +233,7 @@ void read_document(TomlTable root, Config& c, bool foreign_behaviours) {
   read_run(root.table("run"), c);
   read_autopilot(root.table("autopilot"), c);
   read_camera(root.table("camera"), c);
+  read_camera_down(root.table("camera_down"), c.camera_down);
   read_mission(root.table("mission"), c.control.mission);
   read_control(root.table("control"), c);
   read_threads(root.table("threads"), c);
@@ -221,7 +246,10 @@ void read_document(TomlTable root, Config& c, bool foreign_behaviours) {
 Config load_config(const std::vector<std::string>& paths, const std::vector<std::string>& behaviour_names) {
   Config config;
   if (behaviour_names.size() > control::kMaxBehaviours) throw ConfigError("too many behaviours");
-  for (const auto& name : behaviour_names) config.behaviours.push_back({name, 1, 50, 4 * kMillisecond});
+  for (const auto& name : behaviour_names) {
+    config.behaviours.push_back({name, 1, 50, 4 * kMillisecond});
+    config.behaviours.back().enabled = false;
+  }
   config.behaviour_params.assign(behaviour_names.size(), TomlTable(toml::table{}));
   config.control.arbiter.behaviour_count = static_cast<int>(behaviour_names.size());
   std::istringstream defaults(kDefaultConfig);

@@ -20,6 +20,16 @@ struct ThreadRow {
   DurationNs budget_ns = 4 * kMillisecond;
   rt::OverrunPolicy overrun = rt::OverrunPolicy::kSkip;  ///< periodic threads: control, camera
   bool frames_in_order = false;                          ///< behaviours: every frame in turn, not the newest
+  bool enabled = true;                                   ///< behaviours: false: no thread, no cue, not in the plan
+  bool looks_down = false;                               ///< behaviours: released at the second camera's rate
+};
+
+/// The second camera, which looks down.
+struct DownCameraConfig {
+  bool enabled = false;  ///< false: behaviours that look down cannot be enabled
+  double rate_hz = 30.0;
+  double pitch_down_deg = 90.0;
+  CameraGeometry geometry;
 };
 
 /// What the admission test does with a thread table that cannot keep its deadlines.
@@ -46,6 +56,7 @@ struct Config {
   CameraGeometry camera;
   double camera_pitch_down_deg = 30.0;
   double camera_rate_hz = 30.0;  ///< what admission takes as the period of the behaviours
+  DownCameraConfig camera_down;
 
   DurationNs control_period_ns = 50 * kMillisecond;
   DurationNs control_deadline_ns = 10 * kMillisecond;
@@ -60,8 +71,8 @@ struct Config {
 };
 
 /// The defaults, which are config/wasp.toml itself (built in), then `paths` in order; later ones override single keys.
-/// `behaviour_names` are the behaviours this program has, in order; a section for any other is an error. Throws
-/// ConfigError naming file, line and value.
+/// `behaviour_names` are the behaviours this program has, in order; a section for any other is an error, and one
+/// without `enabled = true` in any file is not enabled. Throws ConfigError naming file, line and value.
 Config load_config(const std::vector<std::string>& paths, const std::vector<std::string>& behaviour_names);
 
 }  // namespace wasp::scheduling
