@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "control/mission.h"
-#include "sim/scene.h"
+#include "sim/scene_generators.h"
 #include "tools/quantiles.h"
 #include "vision/heading_rate.h"
 

@@ -47,7 +47,8 @@ MissionSetup load_mission(const std::string& name, std::uint32_t seed, const std
   files.insert(files.end(), extra.begin(), extra.end());
   setup.flight = scheduling::load_config(files, scheduling::names_of(all_behaviours()));
   setup.flight.camera = setup.sim.camera;
-  setup.flight.camera_down = setup.sim.down.setup.geometry;
+  setup.flight.camera_down.geometry = setup.sim.down.setup.geometry;
+  setup.flight.camera_down.enabled = setup.sim.down.enabled;
   return setup;
 }
 
@@ -62,7 +63,7 @@ sim::LockstepOptions lockstep_options(const MissionSetup& setup) {
     const auto& row = table[i];
     if (looks_down(row.stream) && !setup.sim.down.enabled)
       throw std::runtime_error(setup.name + ": behaviour '" + row.name + "' needs [camera_down] in sim.toml");
-    const auto& camera = looks_down(row.stream) ? setup.flight.camera_down : setup.flight.camera;
+    const auto& camera = looks_down(row.stream) ? setup.flight.camera_down.geometry : setup.flight.camera;
     sim::LockstepBehaviour b{static_cast<std::uint32_t>(i), row.stream, row.publishes, {}};
     b.step = [step = row.make_stepper(camera, setup.flight.behaviour_params[i])](const BehaviourInput& input) {
       const auto made = step(input);
