@@ -3,9 +3,7 @@
 #include <embree3/rtcore.h>
 #include <xmmintrin.h>
 
-#include <bit>
 #include <cmath>
-#include <cstring>
 #include <stdexcept>
 
 namespace wasp::sim {
@@ -72,28 +70,17 @@ float shade(const World& world, const Surface& s, const Vec3& o, const Vec3& d, 
 
 }  // namespace
 
-struct Renderer::Scene {
-  RTCDevice device = rtcNewDevice("threads=1,frequency_level=simd512");
-  RTCScene scene = nullptr;
-  ~Scene() {
-    if (scene != nullptr) rtcReleaseScene(scene);
-    if (device != nullptr) rtcReleaseDevice(device);
-  }
-};
-
 Renderer::Renderer(World world, const Intrinsics& intrinsics)
-    : world_(std::move(world)), intrinsics_(intrinsics), scene_(std::make_unique<Scene>()) {
+    : Renderer(std::make_shared<const WorldScene>(std::move(world)), intrinsics) {}
+
+Renderer::Renderer(std::shared_ptr<const WorldScene> scene, const Intrinsics& intrinsics)
+    : scene_(std::move(scene)), intrinsics_(intrinsics) {
   if (intrinsics.width_px <= 0 || intrinsics.height_px <= 0 || intrinsics.width_px % 4 != 0 ||
       intrinsics.height_px % 4 != 0)
     throw std::runtime_error("renderer: image size " + std::to_string(intrinsics.width_px) + " x " +
                              std::to_string(intrinsics.height_px) + " is not a positive multiple of 4");
   build_rays();
-  build_scene();
 }
-
-Renderer::~Renderer() = default;
-Renderer::Renderer(Renderer&&) noexcept = default;
-Renderer& Renderer::operator=(Renderer&&) noexcept = default;
 
 void Renderer::build_rays() {
   const Intrinsics& k = intrinsics_;
@@ -112,29 +99,9 @@ void Renderer::build_rays() {
       }
 }
 
-void Renderer::build_scene() {
-  if (scene_->device == nullptr) throw std::runtime_error("renderer: Embree gives no device");
-  RTCGeometry geometry = rtcNewGeometry(scene_->device, RTC_GEOMETRY_TYPE_QUAD);
-  auto* vertices = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-                                                               3 * sizeof(float), world_.vertices_ned_m.size()));
-  auto* quads = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT4, 4 * sizeof(std::uint32_t),
-                                        world_.quads.size());
-  if (vertices == nullptr || quads == nullptr) throw std::runtime_error("renderer: Embree gives no buffers");
-  for (const Vec3& v : world_.vertices_ned_m)
-    for (int axis = 0; axis < 3; ++axis) *vertices++ = v[axis];
-  std::memcpy(quads, world_.quads.data(), world_.quads.size() * sizeof(world_.quads[0]));
-  rtcCommitGeometry(geometry);
-  scene_->scene = rtcNewScene(scene_->device);
-  rtcSetSceneBuildQuality(scene_->scene, RTC_BUILD_QUALITY_HIGH);
-  rtcAttachGeometry(scene_->scene, geometry);
-  rtcReleaseGeometry(geometry);
-  rtcCommitScene(scene_->scene);
-  if (rtcGetDeviceError(scene_->device) != RTC_ERROR_NONE)
-    throw std::runtime_error("renderer: Embree cannot build the scene");
-}
-
 void Renderer::render_band(const CameraPose& pose, int first_row, float* luminance, float* depth_m) const {
   const FlushDenormals flush;
+  const World& world = scene_->world();
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
@@ -145,14 +112,14 @@ void Renderer::render_band(const CameraPose& pose, int first_row, float* luminan
   const Packet* packet = packets_.data() + static_cast<std::size_t>(first_row / 4) * static_cast<std::size_t>(columns);
   for (int column = 0; column < columns; ++column, ++packet) {
     aim(hits, pose, packet->x, packet->y);
-    rtcIntersect16(kAll, scene_->scene, &context, &hits);
+    rtcIntersect16(kAll, scene_->handle(), &context, &hits);
     for (int i = 0; i < 16; ++i) {
       const int at = i / 4 * intrinsics_.width_px + column * 4 + i % 4;
       const bool hit = hits.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID;
       depth_m[at] = hit ? hits.ray.tfar[i] : 0.f;
-      luminance[at] = hit ? shade(world_, world_.surfaces[hits.hit.primID[i]], pose.position_ned_m,
+      luminance[at] = hit ? shade(world, scene_->surface(hits.hit.geomID[i], hits.hit.primID[i]), pose.position_ned_m,
                                   {hits.ray.dir_x[i], hits.ray.dir_y[i], hits.ray.dir_z[i]}, hits.ray.tfar[i], pixel)
-                          : world_.sky;
+                          : world.sky;
     }
   }
 }

@@ -6,7 +6,7 @@
 #include <memory>
 #include <vector>
 
-#include "sim/world.h"
+#include "sim/world_scene.h"
 #include "types/camera.h"
 
 namespace wasp::sim {
@@ -24,9 +24,8 @@ class Renderer {
   /// Builds the acceleration structure; keeps the world. Image width and height must be multiples of 4.
   /// Throws std::runtime_error when they are not or Embree fails. Distortion is inverted once, for every pixel.
   Renderer(World world, const Intrinsics& intrinsics);
-  ~Renderer();
-  Renderer(Renderer&&) noexcept;
-  Renderer& operator=(Renderer&&) noexcept;
+  /// The same into a world that other cameras see too.
+  Renderer(std::shared_ptr<const WorldScene> scene, const Intrinsics& intrinsics);
 
   /// Rows [first_row, first_row + kBandRows): `luminance` in pixel values (0 ... about 255, not clamped), `depth_m`
   /// along the optical axis (0 where nothing is hit); both row-major, kBandRows x width. first_row is a multiple of
@@ -38,16 +37,13 @@ class Renderer {
   [[nodiscard]] const Intrinsics& intrinsics() const { return intrinsics_; }
 
  private:
-  struct Scene;  ///< Embree's handles
   struct Packet {
     float x[16], y[16];  ///< normalised image coordinates of 4 x 4 pixels
   };
   void build_rays();
-  void build_scene();
 
-  World world_;
+  std::shared_ptr<const WorldScene> scene_;
   Intrinsics intrinsics_;
-  std::unique_ptr<Scene> scene_;
   std::vector<Packet> packets_;  ///< by block row, then block column
 };
 

@@ -1,5 +1,8 @@
 #include "sim/sim_camera.h"
 
+#include <utility>
+
+#include "sim/random.h"
 #include "sim/vrml_file.h"
 
 namespace wasp::sim {
@@ -11,10 +14,20 @@ World world_of(const SimConfig& config) {
 
 }  // namespace
 
+std::shared_ptr<WorldScene> make_world_scene(const SimConfig& config) {
+  return std::make_shared<WorldScene>(world_of(config));
+}
+
+std::uint32_t down_seed(std::uint32_t seed) { return mix(seed, 0xd0); }
+
 SimCamera::SimCamera(const SimConfig& config)
-    : geometry_(config.camera),
-      renderer_(world_of(config), config.camera.intrinsics),
-      sensor_(config.sensor, config.camera.intrinsics.width_px, config.camera.intrinsics.fx_px, config.seed),
+    : SimCamera(make_world_scene(config), config.front(), config.sensor, config.seed) {}
+
+SimCamera::SimCamera(std::shared_ptr<const WorldScene> scene, const CameraSetup& setup, const SensorParams& sensor,
+                     std::uint32_t seed)
+    : geometry_(setup.geometry),
+      renderer_(std::move(scene), setup.geometry.intrinsics),
+      sensor_(sensor, setup.geometry.intrinsics.width_px, setup.geometry.intrinsics.fx_px, seed),
       luminance_(static_cast<std::size_t>(renderer_.width_px()) * Renderer::kBandRows),
       depth_m_(luminance_.size()) {}
 
@@ -33,7 +46,7 @@ void SimCamera::render(const BodyPose& pose, std::uint32_t frame, std::uint8_t* 
       const std::size_t from = static_cast<std::size_t>(i) * width, to = static_cast<std::size_t>(band + i) * width;
       if (almost_done && band + i == renderer_.height_px() - kLastRows) almost_done();
       sensor_.gray_row(frame, band + i, luminance_.data() + from, gray + to);
-      sensor_.depth_row(frame, band + i, depth_m_.data() + from, depth_mm + to);
+      if (depth_mm != nullptr) sensor_.depth_row(frame, band + i, depth_m_.data() + from, depth_mm + to);
     }
   }
 }

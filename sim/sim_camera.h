@@ -1,8 +1,9 @@
-// The simulated Kinect: world, renderer and sensor model behind one call.
+// A simulated camera: world, renderer and sensor model behind one call. The front one is a Kinect and gives depth too.
 #pragma once
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <vector>
 
 #include "sim/pose.h"
@@ -12,14 +13,25 @@
 
 namespace wasp::sim {
 
+/// Builds the laboratory, which takes about a second, or reads the world file. Throws as read_vrml does.
+std::shared_ptr<WorldScene> make_world_scene(const SimConfig& config);
+
+/// The downward camera's seed for a run's seed.
+std::uint32_t down_seed(std::uint32_t seed);
+
 class SimCamera {
  public:
-  /// Builds the laboratory, which takes about a second, or reads the world file. Throws as read_vrml does.
+  /// The front camera in a world of its own.
   explicit SimCamera(const SimConfig& config);
+  /// A camera in a world that others may see too. `seed` numbers the sensor's noise: one of its own for each camera.
+  /// Throws std::runtime_error for sizes the renderer refuses.
+  SimCamera(std::shared_ptr<const WorldScene> scene, const CameraSetup& setup, const SensorParams& sensor,
+            std::uint32_t seed);
 
-  /// Both images of one exposure at a body pose: mono8 and depth uint16 mm (0 = no reading), row-major, no padding,
-  /// width_px x height_px. `frame` numbers the noise. `almost_done`, if given, is called kLastRows rows before the end.
-  /// One thread at a time. Allocates nothing.
+  /// Both images of the exposure whose middle is `pose`: mono8 and depth uint16 mm (0 = no reading; depth_mm may be
+  /// nullptr), row-major, no padding, width_px x height_px. During an exposure (optics.exposure_s) the vehicle moves on
+  /// with the pose's velocity and rate; depth is that of its middle. `frame` numbers the noise. `almost_done`, if
+  /// given, is called kLastRows rows before the end. One thread at a time. Allocates nothing.
   void render(const BodyPose& pose, std::uint32_t frame, std::uint8_t* gray, std::uint16_t* depth_mm,
               const std::function<void()>& almost_done = {});
   static constexpr int kLastRows = 4;  ///< some 10 to 40 us; a sleeping reader wakes up in about 10
