@@ -8,8 +8,11 @@
 
 #include "sim/imu_model.h"
 #include "sim/optics.h"
+#include "sim/safety_pilot.h"
 #include "sim/scene.h"
 #include "sim/sensor_model.h"
+#include "sim/stand.h"
+#include "sim/wind.h"
 #include "types/camera.h"
 
 namespace wasp::sim {
@@ -24,12 +27,15 @@ struct DownCamera {
 struct SimConfig {
   std::uint32_t seed = 1;
   bool safety_pilot = true;
+  PilotParams pilot;
   double clock_offset_s = 1000.25;  ///< autopilot clock minus the simulator's, 0 ... 1e6
   double camera_rate_hz = 30;       ///< 1 ... 120
   CameraGeometry camera;            ///< the front one
   OpticsParams optics;              ///< of the front camera
   DownCamera down;
   VehicleParams vehicle;
+  WindParams wind;
+  StandParams stand;
   ImuParams imu;
   SensorParams sensor;
   std::string world_kind = "laboratory";  ///< one of scene_kinds()
