@@ -18,7 +18,9 @@ namespace wasp::vision {
 /// Of both cameras. Sizes and grid take effect when the State is made.
 struct FlowFieldParams {
   CameraGeometry camera;
-  FlowGridParams grid;
+  /// Variance below the thesis' 200 (5.2) still tracks, as the flow's own sigma says, which is the gate that counts: a
+  /// wall of natural texture has 10 ... 200 grey^2 up close.
+  FlowGridParams grid{.min_variance = 10.f};
   float max_gap_s = 0.2f;    ///< frames farther apart are not compared
   int min_valid_cells = 12;  ///< fewer: the cue is blind (the field is made all the same)
   int min_depth_pixels = 5;  ///< valid ones of the 25 about a cell's centre that make a depth

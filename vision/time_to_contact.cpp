@@ -59,18 +59,26 @@ void update_foe(const Behaviour::Params& p, const FlowField& ahead, TimeNs now_n
   state.has_foe = true;
 }
 
-/// Leaves the cells within the disc about the focus valid; returns how many.
+/// Leaves the cells within the disc about the focus valid; returns how many. The disc grows in a few steps where the
+/// grid is coarse, or the focus at the border of the image or beyond.
 int cut_disc(const Behaviour::Params& p, const Ray& foe, FlowField& ahead) noexcept {
+  constexpr int kSteps = 4;
   const float focal = focal_px(p);
   const Vec3 axis = Vec3(foe.x, foe.y, 1.f).normalized();
-  const float least_cosine = std::cos(p.ahead_angle_rad);
+  std::array<float, FlowField::kMaxColumns * FlowField::kMaxRows> cosine{};
+  for (std::size_t i = 0; i < cosine.size(); ++i)
+    cosine[i] = Vec3(ahead.cells[i].x_px / focal, ahead.cells[i].y_px / focal, 1.f).normalized().dot(axis);
   int cells = 0;
-  for (FlowCell& cell : ahead.cells) {
-    if (cell.valid == 0) continue;
-    const Vec3 d = Vec3(cell.x_px / focal, cell.y_px / focal, 1.f).normalized();
-    cell.valid = d.dot(axis) >= least_cosine ? 1 : 0;
-    cells += cell.valid;
+  float least_cosine = 1.f;
+  for (int step = 0; step <= kSteps && cells < p.wanted_cells; ++step) {
+    const float wider = std::max(p.widest_angle_rad - p.ahead_angle_rad, 0.f);
+    least_cosine = std::cos(p.ahead_angle_rad + wider * static_cast<float>(step) / kSteps);
+    cells = 0;
+    for (std::size_t i = 0; i < cosine.size(); ++i)
+      cells += ahead.cells[i].valid != 0 && cosine[i] >= least_cosine ? 1 : 0;
   }
+  for (std::size_t i = 0; i < cosine.size(); ++i)
+    if (!(cosine[i] >= least_cosine)) ahead.cells[i].valid = 0;
   return cells;
 }
 

@@ -44,11 +44,13 @@ struct TimeToContactFront {
     float max_foe_sigma_rad = 0.1f;  ///< nor a less certain one
     float foe_smoothing_s = 0.2f;    ///< time constant of its low pass
     float foe_memory_s = 1.f;        ///< kept this long when none is found; then the heading takes its place
-    int min_cells = 6;               ///< ahead, that grow alike
-    float min_inlier_share = 0.5f;   ///< of the cells ahead
-    float significance = 3.f;        ///< growth must exceed this many sigmas
-    int pairs = 5;                   ///< of the line
-    float frames_ahead = 30.f;       ///< F_max
+    float widest_angle_rad = 0.5f;   ///< the disc grows so far while it holds fewer than `wanted_cells`
+    int wanted_cells = 12;
+    int min_cells = 6;              ///< ahead, that grow alike
+    float min_inlier_share = 0.5f;  ///< of the cells ahead
+    float significance = 3.f;       ///< growth must exceed this many sigmas
+    int pairs = 5;                  ///< of the line
+    float frames_ahead = 30.f;      ///< F_max
     float max_p_value = 0.05f;
     float max_contact_frames = 45.f;                   ///< gate: the last pair itself
     float least_slope = -3.f, greatest_slope = -0.3f;  ///< gate: of the line
@@ -60,6 +62,8 @@ struct TimeToContactFront {
   static void visit_params(Params& p, Visitor&& visit) {
     visit("frame_s", p.frame_s, 0.005, 0.2);
     visit("ahead_angle_rad", p.ahead_angle_rad, 0.05, 1.0);
+    visit("widest_angle_rad", p.widest_angle_rad, 0.05, 1.0);
+    visit("wanted_cells", p.wanted_cells, 3, FlowField::kMaxColumns * FlowField::kMaxRows);
     visit("foe_angle_rad", p.foe_angle_rad, 0.1, 1.4);
     visit("max_drift_rad", p.max_drift_rad, 0.0, 1.0);
     visit("max_foe_sigma_rad", p.max_foe_sigma_rad, 0.001, 1.0);
