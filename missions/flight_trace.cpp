@@ -1,6 +1,10 @@
 #include "missions/flight_trace.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <cmath>
+#include <fstream>
 #include <stdexcept>
 
 #include "control/mission.h"
@@ -182,6 +186,23 @@ FlightTrace read_trace(const fs::path& folder) {
 TruthEuler euler_of(const Truth& t) {
   const Euler e = euler_from_quat(Quat(t.q_ned_body[0], t.q_ned_body[1], t.q_ned_body[2], t.q_ned_body[3]));
   return {static_cast<double>(e.roll_rad), static_cast<double>(e.pitch_rad), static_cast<double>(e.yaw_rad)};
+}
+
+void write_trace_csv(const FlightTrace& trace, const fs::path& file) {
+  std::ofstream out(file);
+  out << "t_s,north_m,east_m,height_m,roll_rad,pitch_rad,yaw_rad,forward_mps,setpoint_m,estimate_m,velocity_forward_mps,"
+         "velocity_right_mps,yaw_rate_radps,avoid,mode,phase\n";
+  for (const Command& c : trace.commands) {
+    const Truth& t = trace.truth_at(c.due_at_ns);
+    const TruthEuler e = euler_of(t);
+    const double forward = static_cast<double>(t.velocity_ned_mps[0]) * std::cos(e.yaw_rad) +
+                           static_cast<double>(t.velocity_ned_mps[1]) * std::sin(e.yaw_rad);
+    out << fmt::format("{:.3f},{:.4f},{:.4f},{:.4f},{:.5f},{:.5f},{:.5f},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{},{},{}\n",
+                       trace.seconds(c.due_at_ns), t.position_ned_m[0], t.position_ned_m[1], t.height_m, e.roll_rad,
+                       e.pitch_rad, e.yaw_rad, forward, c.height_setpoint_m, c.height_m, c.velocity_forward_mps,
+                       c.velocity_right_mps, c.yaw_rate_radps, c.avoid, static_cast<int>(c.mode), c.mission_phase);
+  }
+  if (!out.flush()) throw std::runtime_error("cannot write " + file.string());
 }
 
 std::vector<LegSpan> legs_of(const FlightTrace& trace) {

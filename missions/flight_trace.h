@@ -36,6 +36,9 @@ FlightTrace trace_of(sim::LockstepLog log, const std::vector<std::string>& names
 /// is missing.
 FlightTrace read_trace(const std::filesystem::path& log_folder);
 
+/// One line a control tick: time since lift-off, where the vehicle was and what it was told. Throws naming the file.
+void write_trace_csv(const FlightTrace& trace, const std::filesystem::path& file);
+
 /// Roll, pitch and heading of a truth sample [rad].
 struct TruthEuler {
   double roll_rad = 0, pitch_rad = 0, yaw_rad = 0;

@@ -182,6 +182,37 @@ Measures measure_corridor(const FlightTrace& trace, const MissionSetup&, WorldPr
           {"way flown", way_m}};
 }
 
+/// Mean height over a stretch of the flight [s since lift-off].
+double mean_height(const FlightTrace& trace, double from_s, double to_s) {
+  double sum = 0;
+  int n = 0;
+  for (const Truth& t : trace.truth) {
+    const double s = trace.seconds(t.exposed_at_ns);
+    if (s >= from_s && s <= to_s) sum += height_m(t), ++n;
+  }
+  return n > 0 ? sum / n : kNone;
+}
+
+Measures measure_arena(const FlightTrace& trace, const MissionSetup& setup, WorldProbe&) {
+  const double at_s = setup.sim.world.arena_step_at_s;
+  const sim::ArenaStep step = sim::arena_step_of(setup.sim.seed, at_s);
+  const double edge_m = static_cast<double>(step.to_m - step.from_m);
+  const double before_m = mean_height(trace, at_s - 2, at_s);
+  const double share = (mean_height(trace, at_s + 8, at_s + 11) - before_m) / edge_m;
+  double half_s = kNone;
+  for (const Truth& t : trace.truth) {
+    const double s = trace.seconds(t.exposed_at_ns);
+    if (s < at_s || (height_m(t) - before_m) / edge_m < 0.5) continue;
+    half_s = s - at_s;
+    break;
+  }
+  return {{"height follows the edge", share > 0.7 && share < 1.3 ? 1 : 0},
+          {"share of the step followed", share},
+          {"time to follow half the step", half_s},
+          {"edge step", edge_m},
+          {"height before the step", before_m}};
+}
+
 Measures measure_city(const FlightTrace& trace, const MissionSetup&, WorldProbe& probe) {
   const Nearest near = nearest_along(trace, probe, 3);
   double height_sum = 0, overshoot = 0, way_m = 0;

@@ -151,8 +151,7 @@ std::vector<Figure> RunFigures::figures() const {
       for (std::size_t i = 0; i < flights_.size(); ++i)
         for (const auto& [name, series] : flights_[i].series) {
           if (name != kind.curves[c] || series.size() == 0) continue;
-          const bool many = flights_.size() > 1;
-          f.plot.curves.push_back({i == 0 ? name : std::string(), {"c" + std::to_string(c), many ? "thin" : "thin"}, series});
+          f.plot.curves.push_back({i == 0 ? name : std::string(), {fmt::format("c{}", c), "thin"}, series});
         }
     if (!f.plot.curves.empty()) out.push_back(std::move(f));
   }
