@@ -79,11 +79,12 @@ std::vector<Defocus::Kernel> Defocus::make_kernels() {
     }
     const double share = wanted > small.variance ? (wanted - small.variance) / (large.variance - small.variance) : 0;
     Kernel& k = kernels[static_cast<std::size_t>(level)];
-    k.reach = share > 0 ? large.reach : small.reach;
+    k.reach = level == 0 ? 0 : large.reach;
     const int side = 2 * k.reach + 1;
-    k.weights.assign(static_cast<std::size_t>(side * side), 0.f);
+    k.weights.assign(static_cast<std::size_t>(side * side), level == 0 ? 1.f : 0.f);
+    if (level == 0) continue;
     const auto add = [&](const Disc& d, double weight) {
-      for (int y = -d.reach; y <= d.reach && weight > 0; ++y)
+      for (int y = -d.reach; y <= d.reach; ++y)
         for (int x = -d.reach; x <= d.reach; ++x)
           k.weights[static_cast<std::size_t>((y + k.reach) * side + x + k.reach)] += static_cast<float>(
               weight * d.weights[static_cast<std::size_t>((y + d.reach) * (2 * d.reach + 1) + x + d.reach)]);
