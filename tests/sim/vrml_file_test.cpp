@@ -62,8 +62,7 @@ TEST_P(EveryKind, LooksTheSameAfterWritingAndReading) {
   EXPECT_NEAR(again.start_yaw_rad, 0.3f, 1e-5f);
   EXPECT_LT((again.start_ned_m - scene.start_ned_m).norm(), 1e-5f);
   EXPECT_NEAR(static_cast<double>(again.world.quads.size()), static_cast<double>(scene.world.quads.size()),
-              0.02 * static_cast<double>(scene.world.quads.size()))
-      << "quads come back as quads, but for slivers";
+              0.02 * static_cast<double>(scene.world.quads.size())) << "quads come back as quads, but for slivers";
   const Picture before = picture_of(scene), after = picture_of(again);
   int different = 0, seen = 0;
   for (std::size_t i = 0; i < before.depth_m.size(); ++i) {
