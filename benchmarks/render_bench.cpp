@@ -104,12 +104,13 @@ int run_render(const Options& options) {
   report.note("frames", "processor time of one thread; grey and depth (fisheye: grey), with sensor noise");
   const double seconds = options.seconds / static_cast<double>(std::size(kWorlds) * 2 * std::size(kOptics));
   for (const char* world : kWorlds) {
-    const auto scene = std::make_shared<const WorldScene>(placed_at_start(make_scene(world, 1)));
+    std::shared_ptr<const WorldScene> scene;
     for (const auto& [width_px, height_px] : kSizes)
       for (const Optics& optics : kOptics) {
         const std::string name =
             std::string(world) + "." + std::to_string(width_px) + "x" + std::to_string(height_px) + "." + optics.name;
         if (name.find(options.only) == std::string::npos) continue;
+        if (!scene) scene = std::make_shared<const WorldScene>(placed_at_start(make_scene(world, 1)));
         CameraSetup setup = setup_of(width_px, height_px);
         optics.set(setup);
         SimCamera camera(scene, setup, SensorParams{}, 1);

@@ -59,6 +59,7 @@ class Renderer {
  private:
   void cast_band(const CameraPose& pose, int first_row, float* luminance, float* range, std::uint32_t* face) const;
   void find_edges(const CastFrame& frame);
+  float aim(RayPacket& rays, std::uint32_t at, std::size_t k, bool used) const;
 
   std::shared_ptr<const WorldScene> scene_;
   CameraRays rays_;

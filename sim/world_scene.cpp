@@ -33,6 +33,8 @@ void WorldScene::build_scene() {
   std::memcpy(quads, world_.quads.data(), world_.quads.size() * sizeof(world_.quads[0]));
   rtcCommitGeometry(geometry);
   scene_ = rtcNewScene(device_);
+  // Without it a ray that meets a quad's diagonal to the last bit slips through between its two triangles.
+  rtcSetSceneFlags(scene_, RTC_SCENE_FLAG_ROBUST);
   rtcSetSceneBuildQuality(scene_, RTC_BUILD_QUALITY_HIGH);
   rtcAttachGeometry(scene_, geometry);
   rtcReleaseGeometry(geometry);
