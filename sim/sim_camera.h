@@ -43,9 +43,11 @@ class SimCamera {
 
  private:
   CameraGeometry geometry_;
+  OpticsParams optics_;
   Renderer renderer_;
   SensorModel sensor_;
-  std::vector<float> luminance_, depth_m_;
+  CastFrame frame_;
+  std::vector<float> depth_m_;  ///< one row
 };
 
 }  // namespace wasp::sim
