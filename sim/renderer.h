@@ -52,6 +52,8 @@ class Renderer {
 
   [[nodiscard]] int width_px() const { return rays_.width_px(); }
   [[nodiscard]] int height_px() const { return rays_.height_px(); }
+  /// Where parts of the world move, hold its `at` while casting.
+  [[nodiscard]] const WorldScene& scene() const { return *scene_; }
   [[nodiscard]] const CameraRays& rays() const { return rays_; }
   /// Pixels with an edge in the frame last smoothed.
   [[nodiscard]] std::size_t edge_pixels() const { return edges_.size(); }

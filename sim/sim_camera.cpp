@@ -41,6 +41,7 @@ CameraPose SimCamera::camera_pose(const BodyPose& pose) const { return camera_po
 void SimCamera::render(const BodyPose& pose, std::uint32_t frame, std::uint8_t* gray, std::uint16_t* depth_mm,
                        const std::function<void()>& almost_done) {
   const CameraPose camera = camera_pose(pose);
+  const WorldScene::Moment moment = renderer_.scene().at(pose.flight_time_s);
   renderer_.cast(camera, frame_);
   if (optics_.antialias) renderer_.antialias(camera, frame_);
   if (exposure_) exposure_->apply(renderer_, pose, frame_);

@@ -30,11 +30,12 @@ drivers::Image<std::uint8_t> draw(const Scene& scene, const View& view) {
   const double half_rad = to_radians(Degrees{view.field_of_view_deg / 2}).value;
   k.fx_px = k.fy_px = static_cast<float>(0.5 * view.width_px / std::tan(half_rad));
   k.cx_px = 0.5f * static_cast<float>(view.width_px - 1), k.cy_px = 0.5f * static_cast<float>(view.height_px - 1);
-  const Renderer renderer(placed_at_start(scene).at(view.at_s), k);
+  const Renderer renderer(placed_at_start(scene), k);
   const Mat3 R_yaw =
       Eigen::AngleAxisf(static_cast<float>(to_radians(Degrees{view.yaw_deg}).value), Vec3::UnitZ()).toRotationMatrix();
   const CameraPose pose{Vec3(view.eye[0], view.eye[1], -view.eye[2]),
                         R_yaw * R_body_cam_from_pitch_down(to_radians(Degrees{view.pitch_down_deg}))};
+  const WorldScene::Moment moment = renderer.scene().at(view.at_s);
   drivers::Image<std::uint8_t> image{view.width_px, view.height_px, {}};
   std::vector<float> luminance(static_cast<std::size_t>(view.width_px) * Renderer::kBandRows), depth(luminance.size());
   for (int row = 0; row < view.height_px; row += Renderer::kBandRows) {
