@@ -158,10 +158,16 @@ void report(const FlowMotionParams& p, const Cells& cells, const Motion& m, cons
   out.residual = static_cast<float>(std::sqrt(squares / freedom));
   out.moved_m = m.t, out.turn_left_rad = m.w;
   const double error = std::max(static_cast<double>(out.residual), 1.0);
-  const Mat6 inverse = n.a.ldlt().solve(Mat6::Identity());
-  out.covariance_m2 = (error * error * inverse.topLeftCorner<3, 3>()).cast<float>();
-  out.valid = out.moved_m.allFinite() && out.covariance_m2.allFinite() &&
-              out.covariance_m2.diagonal().minCoeff() > 0.f && out.inliers >= std::max(p.min_inliers, 4) &&
+  const Eigen::LDLT<Mat6> factors(n.a);
+  for (int axis = 0; axis < 3; ++axis) {  // one at a time: a matrix on the right would go through the heap
+    const Vec6 unit = Vec6::Unit(axis);
+    const Vec6 column = factors.solve(unit);
+    out.covariance_m2.col(axis) = (error * error * column.head<3>()).cast<float>();
+  }
+  const Mat3& c = out.covariance_m2;
+  const bool positive = c(0, 0) > 0.f && c(1, 1) > 0.f && c(2, 2) > 0.f;
+  out.valid = out.moved_m.allFinite() && out.covariance_m2.allFinite() && positive &&
+              out.inliers >= std::max(p.min_inliers, 4) &&
               static_cast<float>(out.inliers) >= p.min_inlier_share * static_cast<float>(out.cells);
 }
 
@@ -187,7 +193,7 @@ FlowMotion flow_motion(const FlowMotionParams& params, const Lens& lens, const F
     if (!solved.allFinite()) return out;
     m = {solved.head<3>().cast<float>(), solved.tail<3>().cast<float>()};
     scale = scale_of(cells, m);
-    limit = kBiweightSigmas * scale;
+    limit = std::min(kBiweightSigmas * scale, params.inlier_sigmas);
   }
   report(params, cells, m, n, limit, out);
   return out;
