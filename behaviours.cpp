@@ -2,6 +2,8 @@
 
 #include "vision/centring.h"
 #include "vision/edge_altitude.h"
+#include "vision/edge_peak.h"
+#include "vision/emd_field.h"
 #include "vision/flow_balance.h"
 #include "vision/flow_field.h"
 #include "vision/ground_altitude.h"
@@ -27,12 +29,14 @@ const scheduling::BehaviourTable& all_behaviours() {
       behaviour_row<vision::TimeToContactFront>(),
       behaviour_row<vision::ObstacleDepth>(),
       behaviour_row<vision::FlowBalance>(),
+      behaviour_row<vision::EdgePeak>(),
       behaviour_row<vision::HeadingRateDown>(),
       behaviour_row<vision::HeadingLogPolarDown>(),
       behaviour_row<vision::Optomotor>(),
       behaviour_row<vision::Centring>(),
       behaviour_row<vision::Speed>(),
       behaviour_row<vision::Landing>(),
+      behaviour_row<vision::EmdField>(),
   };
   return kBehaviours;
 }

@@ -32,7 +32,7 @@ std::vector<const Truth*> on_legs(const FlightTrace& trace) {
 
 /// Distances along the flight from lift-off + `skip_s` to the end of the legs, at most 20 a second.
 struct Nearest {
-  double around_m = WorldProbe::kRange_m;
+  double around_m = kNone;
   double over_sum_m = 0;
   int looks = 0;
   TimeNs first_hit_ns = kNever;
@@ -46,11 +46,11 @@ Nearest nearest_along(const FlightTrace& trace, WorldProbe& probe, double skip_s
     if (s < skip_s || s - looked_s < 0.045) continue;
     looked_s = s;
     const auto look = probe.look(*t, s);
-    out.around_m = std::min(out.around_m, look.around_m);
-    out.over_sum_m += look.below_m;
+    out.around_m = std::fmin(out.around_m, look.around_m);
+    out.over_sum_m += probe.height_over(*t);
     ++out.looks;
-    const bool hit = std::min(look.around_m, look.below_m + 0.1) < WorldProbe::kBodyRadius_m;
-    if (hit && out.first_hit_ns == kNever) out.first_hit_ns = t->exposed_at_ns;
+    const bool aloft = height_m(*t) > 0.6;
+    if ((aloft ? look.collides_in_flight : look.collides) && out.first_hit_ns == kNever) out.first_hit_ns = t->exposed_at_ns;
   }
   return out;
 }
@@ -154,7 +154,7 @@ Measures measure_wall(const FlightTrace& trace, const MissionSetup& setup, World
     for (double d = 0; d < 15; d += 0.02) {
       ahead.position_ned_m[0] = t.position_ned_m[0] + static_cast<float>(d * std::cos(yaw));
       ahead.position_ned_m[1] = t.position_ned_m[1] + static_cast<float>(d * std::sin(yaw));
-      if (probe.look(ahead, trace.seconds(t.exposed_at_ns)).around_m > WorldProbe::kBodyRadius_m) continue;
+      if (!probe.look(ahead, trace.seconds(t.exposed_at_ns)).collides) continue;
       frames = d / std::max(speed, 0.05) * setup.sim.camera_rate_hz;
       break;
     }

@@ -14,15 +14,15 @@ class WorldProbe {
   explicit WorldProbe(const MissionSetup& setup);
   ~WorldProbe();
 
-  /// What is around the vehicle `flight_time_s` after lift-off.
+  /// What is around the vehicle's centre (sim/clearance.h), `flight_time_s` after lift-off.
   struct Look {
-    double around_m = 0;  ///< nearest surface that is not the ground below [m], at most kRange_m
-    double below_m = 0;   ///< from the vehicle down to what is under it
+    double around_m = 0, below_m = 0;  ///< nearest surface beside or above, and below; at most 3 m
+    bool collides = false;             ///< with something it does not stand or land on
+    bool collides_in_flight = false;   ///< or with what is below
   };
-  Look look(const Truth& truth, double flight_time_s);
-
-  static constexpr double kRange_m = 3.0;
-  static constexpr double kBodyRadius_m = 0.30;  ///< nearer than this is a collision
+  [[nodiscard]] Look look(const Truth& truth, double flight_time_s) const;
+  /// From the vehicle's centre straight down to the ground or a roof [m]; 0 where there is nothing.
+  [[nodiscard]] double height_over(const Truth& truth) const;
 
  private:
   struct Parts;

@@ -34,17 +34,11 @@ RTCSceneTy* WorldScene::build_faces(std::uint32_t number, std::size_t first, std
     for (int axis = 0; axis < 3; ++axis) *vertices++ = v[axis];
   std::memcpy(quads, world_.quads.data() + first, count * sizeof(world_.quads[0]));
   rtcCommitGeometry(geometry);
-<<<<<<< HEAD
-  scene_ = rtcNewScene(device_);
-  // Without it a ray that meets a quad's diagonal to the last bit slips through between its two triangles.
-  rtcSetSceneFlags(scene_, RTC_SCENE_FLAG_ROBUST);
-  rtcSetSceneBuildQuality(scene_, RTC_BUILD_QUALITY_HIGH);
-  rtcAttachGeometry(scene_, geometry);
-=======
   RTCScene scene = rtcNewScene(device_);
+  // Without it a ray that meets a quad's diagonal to the last bit slips through between its two triangles.
+  rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
   rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_HIGH);
   rtcAttachGeometryByID(scene, geometry, number);
->>>>>>> worlds
   rtcReleaseGeometry(geometry);
   rtcCommitScene(scene);
   return scene;
