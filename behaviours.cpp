@@ -36,7 +36,7 @@ const scheduling::BehaviourTable& all_behaviours() {
       behaviour_row<vision::Centring>(),
       behaviour_row<vision::Speed>(),
       behaviour_row<vision::Landing>(),
-      behaviour_row<vision::EmdField>(),
+      behaviour_row<vision::EmdFlow>(),
   };
   return kBehaviours;
 }
