@@ -42,23 +42,28 @@ void Renderer::find_edges(const CastFrame& frame) {
   }
 }
 
+/// Rays 4 k ... 4 k + 3 of a packet for pixel `at`; how wide the pixel is.
+float Renderer::aim(RayPacket& rays, std::uint32_t at, std::size_t k, bool used) const {
+  const int u = static_cast<int>(at) % width_px(), v = static_cast<int>(at) / width_px();
+  const RayPacket& from = rays_.packet(v / 4, u / 4);
+  const Vec3 centre = rays_.direction(u, v);
+  for (std::size_t i = 0; i < 4; ++i) {
+    const Vec3 d = centre + kOffset_px[i][0] * from.du + kOffset_px[i][1] * from.dv;
+    rays.x[4 * k + i] = d.x(), rays.y[4 * k + i] = d.y(), rays.z[4 * k + i] = d.z();
+    rays.seen[4 * k + i] = used ? -1 : 0;
+  }
+  return from.pixel;
+}
+
 void Renderer::antialias(const CameraPose& pose, CastFrame& frame) {
   const FlushDenormals flush;
   find_edges(frame);
   PacketCast cast(*scene_, pose);
   RayPacket rays;
-  const auto width = static_cast<std::uint32_t>(width_px());
   for (std::size_t first = 0; first < edges_.size(); first += 4) {
     const std::size_t count = std::min<std::size_t>(4, edges_.size() - first);
     float pixel = 0;
-    for (std::size_t i = 0; i < 16; ++i) {
-      const std::uint32_t at = edges_[first + std::min(i / 4, count - 1)];
-      const int u = static_cast<int>(at % width), v = static_cast<int>(at / width);
-      const Vec3 d = rays_.direction(u, v, kOffset_px[i % 4][0], kOffset_px[i % 4][1]);
-      rays.x[i] = d.x(), rays.y[i] = d.y(), rays.z[i] = d.z();
-      rays.seen[i] = i / 4 < count ? -1 : 0;
-      pixel = rays_.packet(v / 4, u / 4).pixel;
-    }
+    for (std::size_t i = 0; i < 4; ++i) pixel = aim(rays, edges_[first + std::min(i, count - 1)], i, i < count);
     cast.cast(rays, 0.5f * pixel);
     for (std::size_t i = 0; i < count; ++i) {
       const float* l = cast.luminance + 4 * i;

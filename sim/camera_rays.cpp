@@ -17,14 +17,24 @@ CameraRays::CameraRays(const Lens& lens, float field_of_view_rad) : lens_(lens) 
   packets_.resize(static_cast<std::size_t>(k.width_px / 4) * static_cast<std::size_t>(k.height_px / 4));
   for (int v = 0; v < k.height_px; ++v)
     for (int u = 0; u < k.width_px; ++u) aim(u, v, field_of_view_rad);
-  for (int row = 0; row < k.height_px / 4; ++row)
-    for (int column = 0; column < k.width_px / 4; ++column) {
-      const int u = 4 * column + 1, v = 4 * row + 1;
-      // The side of the square that a pixel covers; a pinhole's ray is longer off the axis just as its pixel is larger.
-      const float area = slope(u, v, 1, 0).cross(slope(u, v, 0, 1)).norm();
-      RayPacket& packet = packets_[static_cast<std::size_t>(row * (k.width_px / 4) + column)];
-      packet.pixel = lens_.kind == LensKind::kPinhole || !(area > 0.f) ? 1.f / k.fx_px : std::sqrt(area);
-    }
+  for (int v = 0; v < k.height_px; v += 4)
+    for (int u = 0; u < k.width_px; u += 4)
+      measure(packets_[static_cast<std::size_t>(v / 4 * (k.width_px / 4) + u / 4)], u, v);
+}
+
+/// Slopes of the packet whose first pixel is (u, v), at the seen pixel nearest to its middle.
+void CameraRays::measure(RayPacket& packet, int u, int v) const {
+  constexpr int kFromTheMiddle[16] = {5, 6, 9, 10, 1, 2, 4, 7, 8, 11, 13, 14, 0, 3, 12, 15};
+  packet.du = packet.dv = Vec3::Zero();
+  for (const int i : kFromTheMiddle) {
+    if (packet.seen[i] == 0) continue;
+    packet.du = slope(u + i % 4, v + i / 4, 1, 0);
+    packet.dv = slope(u + i % 4, v + i / 4, 0, 1);
+    break;
+  }
+  // The side of the square that a pixel covers; a pinhole's ray is longer off the axis just as its pixel is larger.
+  const float area = packet.du.cross(packet.dv).norm();
+  packet.pixel = lens_.kind == LensKind::kPinhole || !(area > 0.f) ? 1.f / lens_.intrinsics.fx_px : std::sqrt(area);
 }
 
 void CameraRays::aim(int u, int v, float field_of_view_rad) {
@@ -57,10 +67,6 @@ Vec3 CameraRays::slope(int u, int v, int step_u, int step_v) const {
   const int steps = u1 - u0 + v1 - v0;
   if (steps == 0) return Vec3::Zero();
   return (direction(u1, v1) - direction(u0, v0)) / static_cast<float>(steps);
-}
-
-Vec3 CameraRays::direction(int u, int v, float du, float dv) const {
-  return direction(u, v) + du * slope(u, v, 1, 0) + dv * slope(u, v, 0, 1);
 }
 
 float CameraRays::axis(int u, int v) const {

@@ -15,7 +15,8 @@ namespace wasp::sim {
 struct RayPacket {
   alignas(64) float x[16], y[16], z[16];  ///< directions, camera axes; (0, 0, 1) where the lens sees nothing
   alignas(64) std::int32_t seen[16];      ///< -1, or 0 beyond the lens' field
-  float pixel;                            ///< a pixel's width at ray parameter 1, in the middle of the packet [m]
+  Vec3 du, dv;                            ///< change of direction for one pixel to the right and down, mid-packet
+  float pixel;                            ///< a pixel's width at ray parameter 1 [m]
 };
 
 class CameraRays {
@@ -33,13 +34,12 @@ class CameraRays {
   }
   [[nodiscard]] bool seen(int u, int v) const { return packet(v / 4, u / 4).seen[v % 4 * 4 + u % 4] != 0; }
   [[nodiscard]] Vec3 direction(int u, int v) const;
-  /// Direction at a place up to half a pixel off the centre of (u, v), to second order.
-  [[nodiscard]] Vec3 direction(int u, int v, float du, float dv) const;
   /// Depth along the optical axis for a ray parameter of 1; 0 behind the lens and where nothing is seen.
   [[nodiscard]] float axis(int u, int v) const;
 
  private:
   void aim(int u, int v, float field_of_view_rad);
+  void measure(RayPacket& packet, int u, int v) const;
   [[nodiscard]] Vec3 slope(int u, int v, int step_u, int step_v) const;
 
   Lens lens_;

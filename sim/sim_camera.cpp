@@ -30,12 +30,13 @@ SimCamera::SimCamera(std::shared_ptr<const WorldScene> scene, const CameraSetup&
       renderer_(std::move(scene), setup.geometry.lens(), setup.optics.field_of_view_rad),
       sensor_(sensor, setup.geometry.intrinsics.width_px, setup.geometry.intrinsics.fx_px, seed),
       frame_(renderer_.frame()),
-      depth_m_(static_cast<std::size_t>(renderer_.width_px())) {}
-
-CameraPose SimCamera::camera_pose(const BodyPose& pose) const {
-  return {pose.position_ned_m + pose.q_ned_body * geometry_.position_body_m,
-          pose.q_ned_body.toRotationMatrix() * geometry_.R_body_cam};
+      depth_m_(static_cast<std::size_t>(renderer_.width_px())) {
+  const OpticsParams& o = setup.optics;
+  if (o.exposure_s > 0) exposure_.emplace(geometry_, o.exposure_s, o.antialias, renderer_);
+  if (o.aperture_m > 0) defocus_.emplace(o, geometry_.intrinsics.fx_px, renderer_.width_px(), renderer_.height_px());
 }
+
+CameraPose SimCamera::camera_pose(const BodyPose& pose) const { return camera_pose_of(pose, geometry_); }
 
 void SimCamera::render(const BodyPose& pose, std::uint32_t frame, std::uint8_t* gray, std::uint16_t* depth_mm,
                        const std::function<void()>& almost_done) {
@@ -43,6 +44,8 @@ void SimCamera::render(const BodyPose& pose, std::uint32_t frame, std::uint8_t* 
   const WorldScene::Moment moment = renderer_.scene().at(pose.flight_time_s);
   renderer_.cast(camera, frame_);
   if (optics_.antialias) renderer_.antialias(camera, frame_);
+  if (exposure_) exposure_->apply(renderer_, pose, frame_);
+  if (defocus_) defocus_->apply(frame_);
   const auto width = static_cast<std::size_t>(renderer_.width_px());
   for (int row = 0; row < renderer_.height_px(); ++row) {
     const std::size_t at = static_cast<std::size_t>(row) * width;
