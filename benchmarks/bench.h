@@ -8,7 +8,7 @@ namespace wasp::bench {
 struct Options {
   bool json = false;      ///< one object a line on stdout: {"name", "value", "unit", "bar", "ok", ...}; else a table
   double seconds = 20;    ///< about how long the whole benchmark may measure
-  std::string only = {};  ///< vision: only kernels whose name contains this
+  std::string only = {};  ///< vision, render: only rows whose name contains this
 };
 
 /// Each returns 0 if it measured and met its bars, 1 if a bar was missed, 2 if it could not measure.
@@ -16,5 +16,6 @@ int run_ipc(const Options& options);
 int run_bridge(const Options& options);
 int run_micro(const Options& options);
 int run_vision(const Options& options);
+int run_render(const Options& options);
 
 }  // namespace wasp::bench

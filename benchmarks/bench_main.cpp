@@ -18,6 +18,8 @@ constexpr Row kRows[] = {
      wasp::bench::run_ipc},
     {"bridge", "control timing with and without the iceoryx gateway, killed and frozen at random beside the flight",
      wasp::bench::run_bridge},
+    {"render", "frames of the simulated camera: worlds, sizes, lenses, antialiasing, defocus, motion blur",
+     wasp::bench::run_render},
 #ifdef WASP_HAVE_BENCHMARK
     {"micro",
      "histogram, seqlock, queue, ring, bell, MAVLink, control step, first touch: one operation each (Google Benchmark)",
@@ -40,8 +42,8 @@ int main(int argc, char** argv) {
     CLI::App* command = app.add_subcommand(row.name, row.help);
     command->add_flag("--json", options.json, "one JSON object a line");
     command->add_option("--seconds", options.seconds, "about how long to measure")->check(CLI::Range(1.0, 3600.0));
-    if (row.name == std::string_view("vision"))
-      command->add_option("--only", options.only, "only kernels whose name contains this");
+    if (row.name == std::string_view("vision") || row.name == std::string_view("render"))
+      command->add_option("--only", options.only, "only rows whose name contains this");
     command->callback([&chosen, &row] { chosen = &row; });
   }
   wasp::bench::LatencyOptions latency;

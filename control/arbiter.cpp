@@ -16,40 +16,69 @@ void note_evidence(Intention& intention, const Cue& cue, const ArbiterRow& row) 
     intention.oldest_exposed_at_ns = cue.exposed_at_ns;
 }
 
+
+/// Keeps the first source in rank order; one over its budget stands behind every punctual one.
+struct Choice {
+  int source = -1, rank = 0;
+  void offer(int behaviour, int its_rank, bool overdue) noexcept {
+    const int r = its_rank + (overdue ? kOverdueRank : 0);
+    if (its_rank >= 0 && (source < 0 || r < rank)) source = behaviour, rank = r;
+  }
+};
+
+bool all_finite(const CueBody& b) noexcept {
+  const float sum = b.height_m + b.height_sigma_m + b.heading_rate_radps + b.pitch_rad + b.velocity_forward_mps +
+                    b.velocity_right_mps + b.velocity_sigma_mps + b.climb_mps + b.climb_1ps;
+  return std::isfinite(sum);
+}
+
+void add_wishes(const Cue& cue, const ArbiterRow& row, Intention& out) noexcept {
+  const CueBody& b = cue.body;
+  const bool heading = b.has_heading_rate != 0 && row.heading_weight > 0;
+  const bool pitch = b.has_pitch != 0 && row.pitch_weight > 0;
+  if (b.avoid != 0) out.avoid = true;
+  if (heading) out.heading_rate_radps += row.heading_weight * b.heading_rate_radps;
+  if (pitch) out.pitch_rad += row.pitch_weight * b.pitch_rad;
+  out.steered = out.steered || heading;
+  if (b.avoid != 0 || row.heading_weight > 0 || row.pitch_weight > 0) note_evidence(out, cue, row);
+}
+
 }  // namespace
 
 bool usable(const Cue& cue, const ArbiterRow& row, TimeNs now_ns) noexcept {
-  const CueBody& b = cue.body;
-  const bool finite = std::isfinite(b.height_m) && std::isfinite(b.height_sigma_m) &&
-                      std::isfinite(b.heading_rate_radps) && std::isfinite(b.pitch_rad);
-  return finite && b.validity == Validity::kValid && cue.over_budget == 0 &&
+  return all_finite(cue.body) && cue.body.validity == Validity::kValid && cue.over_budget == 0 &&
          cue.exposed_at_ns <= now_ns + kClockSlack && now_ns - cue.exposed_at_ns <= row.age_limit_ns;
 }
 
 Intention arbitrate(const ArbiterParams& params, const CueSet& set, TimeNs now_ns) noexcept {
   Intention out;
-  int best_rank = -1;  // of those asked so far; an overdue one stands behind every punctual one
+  Choice height, velocity, climb;
   for (int i = 0; i < std::min(params.behaviour_count, kMaxBehaviours); ++i) {
     const auto k = static_cast<std::size_t>(i);
     const ArbiterRow& row = params.rows[k];
     const Cue& cue = set.cues[k];
     if (!set.present[k] || !usable(cue, row, now_ns)) continue;
-    const int rank = row.height_rank + (set.overdue[k] ? kOverdueRank : 0);
-    if (cue.body.has_height != 0 && row.height_rank >= 0 && (best_rank < 0 || rank < best_rank)) {
-      best_rank = rank;
-      out.height_source = i;
-      out.height_m = cue.body.height_m;
-      out.height_sigma_m = cue.body.height_sigma_m;
-      out.height_exposed_at_ns = cue.exposed_at_ns;
-    }
-    if (cue.body.avoid != 0) out.avoid = true;
-    if (cue.body.has_heading_rate != 0) out.heading_rate_radps += row.heading_weight * cue.body.heading_rate_radps;
-    if (cue.body.has_pitch != 0) out.pitch_rad += row.pitch_weight * cue.body.pitch_rad;
-    if (cue.body.avoid != 0 || row.heading_weight > 0 || row.pitch_weight > 0) note_evidence(out, cue, row);
+    if (cue.body.has_height != 0) height.offer(i, row.height_rank, set.overdue[k]);
+    if (cue.body.has_velocity != 0) velocity.offer(i, row.velocity_rank, set.overdue[k]);
+    if (cue.body.has_climb != 0) climb.offer(i, row.climb_rank, set.overdue[k]);
+    add_wishes(cue, row, out);
   }
-  if (out.height_source >= 0) {
-    const auto k = static_cast<std::size_t>(out.height_source);
-    note_evidence(out, set.cues[k], params.rows[k]);
+  for (const int source : {height.source, velocity.source, climb.source})
+    if (source >= 0) note_evidence(out, set.cues[static_cast<std::size_t>(source)],
+                                   params.rows[static_cast<std::size_t>(source)]);
+  if ((out.height_source = height.source) >= 0) {
+    const Cue& cue = set.cues[static_cast<std::size_t>(height.source)];
+    out.height_m = cue.body.height_m, out.height_sigma_m = cue.body.height_sigma_m;
+    out.height_exposed_at_ns = cue.exposed_at_ns;
+  }
+  if ((out.velocity_source = velocity.source) >= 0) {
+    const Cue& cue = set.cues[static_cast<std::size_t>(velocity.source)];
+    out.velocity_forward_mps = cue.body.velocity_forward_mps, out.velocity_right_mps = cue.body.velocity_right_mps;
+    out.velocity_exposed_at_ns = cue.exposed_at_ns;
+  }
+  if ((out.climb_source = climb.source) >= 0) {
+    const CueBody& body = set.cues[static_cast<std::size_t>(climb.source)].body;
+    out.climb_mps = body.climb_mps, out.climb_1ps = body.climb_1ps;
   }
   if (out.avoid) out.pitch_rad = std::max(out.pitch_rad, 0.f);  // never forward while something is ahead
   return out;

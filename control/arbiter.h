@@ -1,6 +1,7 @@
 // The arbiter turns the newest cue of every behaviour into one intention. A cue older than its age limit is absent.
-// Avoid wins over everything else a behaviour says; heading and pitch are weighted sums; height comes from the first
-// source in the fallback order that can see; one that is at this moment over its time budget is asked last.
+// Avoid wins over everything else a behaviour says; heading and pitch are weighted sums; height, velocity and the wish to
+// climb each come from the first source in their fallback order that can see; one that is at this moment over its time
+// budget is asked last. Above all of it stands manual control: see control/flight_mode.h. Why: docs/behaviours.md.
 #pragma once
 
 #include <array>
@@ -16,6 +17,8 @@ inline constexpr int kMaxBehaviours = 24;
 struct ArbiterRow {
   DurationNs age_limit_ns = 250 * kMillisecond;
   int height_rank = -1;        ///< 0 is asked first; -1: never a height source
+  int velocity_rank = -1;      ///< likewise for the velocity over ground
+  int climb_rank = -1;         ///< likewise for the wish to climb
   float heading_weight = 0.f;  ///< >= 0
   float pitch_weight = 0.f;    ///< >= 0
 };
@@ -37,7 +40,13 @@ struct Intention {
   float height_m = 0;
   float height_sigma_m = 0;
   TimeNs height_exposed_at_ns = kNever;
+  int velocity_source = -1;
+  float velocity_forward_mps = 0, velocity_right_mps = 0;
+  TimeNs velocity_exposed_at_ns = kNever;
+  int climb_source = -1;
+  float climb_mps = 0, climb_1ps = 0;
   bool avoid = false;
+  bool steered = false;  ///< a behaviour with a weight says something of the heading
   float heading_rate_radps = 0;
   float pitch_rad = 0;
   TimeNs oldest_exposed_at_ns = kNever;  ///< oldest evidence in this intention

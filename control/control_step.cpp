@@ -1,6 +1,8 @@
 #include "control/control_step.h"
 
+#include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "types/frames.h"
 
@@ -25,14 +27,14 @@ float cos_tilt(const ControlInput& in) noexcept {
   return in.attitude_present ? (attitude_of(in) * Vec3::UnitZ()).z() : 1.f;
 }
 
-Situation assess(const ControlParams& p, const ControlInput& in, const Intention& intention, const ControlState& s,
+Situation assess(const ControlParams& p, const ControlInput& in, bool height_seen, const ControlState& s,
                  bool finite) noexcept {
   Situation now;
   now.autopilot_armed = in.autopilot.armed;
   now.autopilot_follows = in.autopilot.follows;
   now.link_alive = in.autopilot.heard_at_ns != kNever && in.now_ns - in.autopilot.heard_at_ns <= p.link_age_limit_ns;
   now.attitude_fresh = in.attitude_present && in.now_ns - in.attitude.exposed_at_ns <= p.attitude_age_limit_ns;
-  now.ground_seen = intention.height_source >= 0;
+  now.ground_seen = height_seen;
   now.ground_lost_long =
       !now.ground_seen && s.ground_seen_at_ns != kNever && in.now_ns - s.ground_seen_at_ns > p.ground_hold_limit_ns;
   now.setpoint_finite = finite;
@@ -40,18 +42,84 @@ Situation assess(const ControlParams& p, const ControlInput& in, const Intention
   return now;
 }
 
+/// Level specific force plus gravity: what the vehicle accelerates with, along the heading and to its right.
+LevelVelocity accel_level(const ControlInput& in) noexcept {
+  if (!in.attitude_present || !in.accel_present) return {};
+  const Euler e = euler_from_quat(attitude_of(in));
+  const Vec3 level = quat_from_euler({e.roll_rad, e.pitch_rad, 0.f}) *
+                     Vec3(in.accel_body_mps2[0], in.accel_body_mps2[1], in.accel_body_mps2[2]);
+  return {level.x(), level.y()};
+}
+
+/// Carries height and velocity forward and corrects them by what was seen. True if a height is known now.
+bool estimate(const ControlParams& p, const ControlInput& in, const Intention& intention, ControlState& s) noexcept {
+  predict(p.height_filter, accel_up(in), in.now_ns, s.height);
+  predict(p.velocity_filter, accel_level(in), in.attitude_present ? in.attitude.rate_body_radps[2] : 0.f, in.now_ns,
+          s.velocity);
+  if (intention.velocity_source >= 0)
+    correct(p.velocity_filter, {intention.velocity_forward_mps, intention.velocity_right_mps},
+            intention.velocity_exposed_at_ns, in.now_ns, s.velocity);
+  const bool seen = intention.height_source >= 0;
+  float barometric_m = 0;
+  const bool pressed =
+      barometer_step(p.barometer, in.pressure_hpa, !in.autopilot.armed, seen, intention.height_m, s.barometer, barometric_m);
+  if (seen)
+    correct(p.height_filter, intention.height_m, intention.height_exposed_at_ns, in.now_ns, s.height);
+  else if (pressed)
+    correct(p.height_filter, barometric_m, in.now_ns, in.now_ns, s.height);
+  if (seen || pressed) s.ground_seen_at_ns = in.now_ns;
+  return seen || pressed;
+}
+
+/// The height to hold: the leg's, or where the behaviours' wish to climb moves it.
+float target_height(const ControlParams& p, const Intention& intention, const MissionWish& wish, float dt_s,
+                    const ControlState& s) noexcept {
+  if (!wish.behaviours_climb || !s.altitude_hold.engaged) return wish.target_m;
+  const float climb_mps = intention.climb_source >= 0 ? intention.climb_mps + intention.climb_1ps * s.height.height_m : 0.f;
+  return std::clamp(s.altitude_hold.setpoint_m + climb_mps * dt_s, p.min_height_m, p.max_height_m);
+}
+
+/// Yaw rate: the behaviours' sum and the sticks; while there is neither, back to the heading held, if one is to be held.
+float wanted_yaw_rate(const ControlParams& p, const ControlInput& in, const Intention& intention,
+                      const MissionWish& wish, ControlState& s) noexcept {
+  const float asked = (wish.steer ? intention.heading_rate_radps : 0.f) + wish.yaw_rate_radps;
+  const bool steered = (wish.steer && intention.steered) || wish.yaw_rate_radps != 0.f;
+  if (!p.hold_heading || steered || !in.attitude_present) {
+    s.holding_yaw = false;
+    return asked;
+  }
+  const float yaw_rad = euler_from_quat(attitude_of(in)).yaw_rad;
+  if (!s.holding_yaw) s.held_yaw_rad = yaw_rad, s.holding_yaw = true;
+  constexpr float kHeadingGain_1ps = 0.8f;
+  return kHeadingGain_1ps * std::remainder(s.held_yaw_rad - yaw_rad, 2 * std::numbers::pi_v<float>);
+}
+
+/// Forward speed: the leg's, but zero from an avoid on until its hold time is over. Avoid wins over everything.
+float wanted_speed(const ControlParams& p, const ControlInput& in, const Intention& intention, const MissionWish& wish,
+                   ControlState& s) noexcept {
+  if (intention.avoid) s.avoid_until_ns = in.now_ns + from_seconds(static_cast<double>(p.avoid_hold_s));
+  return s.avoid_until_ns != kNever && in.now_ns < s.avoid_until_ns ? 0.f : wish.forward_mps;
+}
+
 /// What behaviours and mission together want, before limits and mode.
 Setpoint wanted_setpoint(const ControlParams& p, const ControlInput& in, const Intention& intention,
                          const MissionWish& wish, ControlState& s) noexcept {
   Setpoint wanted;
+  const float forward_mps = wanted_speed(p, in, intention, wish, s);
   if (!wish.rotors) {
-    s.altitude_hold.engaged = false;
+    s.altitude_hold.engaged = s.holding_yaw = false;
+    s.velocity_hold = VelocityHoldState{};
     return wanted;
   }
-  wanted.pitch_rad = intention.pitch_rad;
-  wanted.yaw_rate_radps = intention.heading_rate_radps;
-  wanted.thrust = altitude_hold_step(p.altitude_hold, wish.target_m, s.height.height_m, s.height.climb_rate_mps,
-                                     cos_tilt(in), in.dt_s, s.altitude_hold);
+  const bool moving = known(p.velocity_filter, s.velocity, in.now_ns);
+  const Tilt tilt = velocity_hold_step(p.velocity_hold, forward_mps, moving, s.velocity.velocity_mps, in.dt_s, s.velocity_hold);
+  const float pitch_wish = wish.steer ? intention.pitch_rad : 0.f;
+  const bool avoiding = intention.avoid || (s.avoid_until_ns != kNever && in.now_ns < s.avoid_until_ns);
+  wanted.roll_rad = tilt.roll_rad + wish.roll_rad;
+  wanted.pitch_rad = tilt.pitch_rad + (avoiding ? std::fmax(0.f, pitch_wish) : pitch_wish + wish.pitch_rad);
+  wanted.yaw_rate_radps = wanted_yaw_rate(p, in, intention, wish, s);
+  wanted.thrust = altitude_hold_step(p.altitude_hold, target_height(p, intention, wish, in.dt_s, s), s.height.height_m,
+                                     s.height.climb_rate_mps, cos_tilt(in), in.dt_s, s.altitude_hold);
   return wanted;
 }
 
@@ -122,21 +190,17 @@ void refuse(const ControlParams& p, const ControlInput& in, Refusal refusal, Con
 
 ControlOutput control_step(const ControlParams& p, const ControlInput& in, ControlState& s) noexcept {
   const Intention intention = arbitrate(p.arbiter, in.cues, in.now_ns);
-  predict(p.height_filter, accel_up(in), in.now_ns, s.height);
-  if (intention.height_source >= 0) {
-    s.ground_seen_at_ns = in.now_ns;
-    correct(p.height_filter, intention.height_m, intention.height_exposed_at_ns, in.now_ns, s.height);
-  }
+  const bool height_seen = estimate(p, in, intention, s);
   const MissionWish wish =
       mission_step(p.mission,
-                   {in.now_ns, in.autopilot.armed, in.autopilot.follows, intention.height_source >= 0,
+                   {in.now_ns, in.autopilot.armed, in.autopilot.follows, height_seen,
                     s.height.height_m, s.height.climb_rate_mps, in.stop_requested, in.autopilot.heard_at_ns != kNever},
                    s.mission);
   const Setpoint wanted = wanted_setpoint(p, in, intention, wish, s);
   s.sent_before = s.sent;
   Setpoint probe = s.sent;
   const bool finite = limit(p.limits, wanted, in.dt_s, probe);
-  flight_mode_step(assess(p, in, intention, s, finite), s.mode);
+  flight_mode_step(assess(p, in, height_seen, s, finite), s.mode);
 
   const bool standing = !wish.rotors && s.mode.mode != FlightMode::kManual;
   const Setpoint chosen = standing ? Setpoint{} : by_mode(p, in, s.mode.mode, wanted);
@@ -149,6 +213,12 @@ ControlOutput control_step(const ControlParams& p, const ControlInput& in, Contr
   c.height_setpoint_m = wish.rotors ? s.altitude_hold.setpoint_m : 0.f;
   c.height_m = s.height.height_m;
   c.climb_rate_mps = s.height.climb_rate_mps;
+  if (known(p.velocity_filter, s.velocity, in.now_ns)) {
+    c.velocity_forward_mps = s.velocity.velocity_mps.forward;
+    c.velocity_right_mps = s.velocity.velocity_mps.right;
+    c.velocity_held = p.velocity_hold.hold != VelocityHold::kOff ? 1 : 0;
+  }
+  c.avoid = intention.avoid ? 1 : 0;
   c.mission_phase = static_cast<std::uint8_t>(s.mission.phase);
   out.ask_arm = wish.armed && !(in.autopilot.armed && in.autopilot.follows) && s.mission.phase == MissionPhase::kArm;
   out.ask_disarm = wish.disarm && in.autopilot.armed;

@@ -4,10 +4,12 @@
 
 #include "control/altitude_hold.h"
 #include "control/arbiter.h"
+#include "control/barometer.h"
 #include "control/flight_mode.h"
 #include "control/height_filter.h"
 #include "control/limits.h"
 #include "control/mission.h"
+#include "control/velocity_hold.h"
 #include "types/messages.h"
 #include "types/realtime.h"
 
@@ -19,11 +21,17 @@ struct ControlParams {
   ArbiterParams arbiter;
   HeightFilterParams height_filter;
   AltitudeHoldParams altitude_hold;
+  BarometerParams barometer;  ///< the last height source, where enabled
+  VelocityFilterParams velocity_filter;
+  VelocityHoldParams velocity_hold;
   LimitParams limits;
   MissionParams mission;
   DurationNs attitude_age_limit_ns = 200 * kMillisecond;
   DurationNs link_age_limit_ns = 300 * kMillisecond;  ///< silence after which the link counts as lost
   DurationNs ground_hold_limit_ns = 1 * kSecond;      ///< how long to hold on the accelerometer alone
+  float avoid_hold_s = 3.f;    ///< forward speed stays zero this long after avoid was raised
+  bool hold_heading = false;   ///< while nobody steers, keep the heading of the moment nobody began to
+  float min_height_m = 0.3f, max_height_m = 4.f;  ///< where behaviours may climb and sink to
   float failsafe_thrust_share = 0.96f;                ///< of hover thrust: a gentle descent
   FailsafeAction failsafe_action = FailsafeAction::kDescend;
 };
@@ -43,6 +51,7 @@ struct ControlInput {
   AttitudeSample attitude;
   bool accel_present = false;
   std::array<float, 3> accel_body_mps2{};  ///< mean specific force since the last tick
+  float pressure_hpa = 0;                  ///< mean since the last tick; 0: none came
   AutopilotState autopilot;
   bool stop_requested = false;
   bool deadlines_missed = false;  ///< the last two ticks
@@ -51,6 +60,12 @@ struct ControlInput {
 struct ControlState {
   HeightFilterState height;
   AltitudeHoldState altitude_hold;
+  BarometerState barometer;
+  VelocityFilterState velocity;
+  VelocityHoldState velocity_hold;
+  TimeNs avoid_until_ns = kNever;
+  float held_yaw_rad = 0;
+  bool holding_yaw = false;
   Setpoint sent, sent_before;  ///< of this tick and of the one before
   ModeState mode;
   MissionState mission;

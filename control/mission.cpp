@@ -1,9 +1,12 @@
 #include "control/mission.h"
 
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
 namespace wasp::control {
 namespace {
 
-constexpr float kLandedMargin_m = 0.06f;  // this close to the standing height counts as standing
 constexpr DurationNs kLandedFor = 700 * kMillisecond;
 constexpr double kLongestLanding_s = 60.0, kLongestDisarm_s = 10.0;
 constexpr float kBelowGround_m = 0.25f;  // landing target: firmly onto the floor
@@ -21,8 +24,8 @@ void end_early(MissionState& s, MissionPhase phase, EarlyEnd why, TimeNs now_ns)
 
 MissionPhase leg_phase(int i) noexcept { return static_cast<MissionPhase>(static_cast<int>(MissionPhase::kLeg0) + i); }
 
-bool standing_long_enough(const MissionInput& in, MissionState& s) noexcept {
-  if (!in.ground_seen || in.height_m > s.ground_height_m + kLandedMargin_m) {
+bool standing_long_enough(const MissionParams& p, const MissionInput& in, MissionState& s) noexcept {
+  if (!in.ground_seen || in.height_m > s.ground_height_m + p.landed_margin_m) {
     s.settled_since_ns = kNever;
     return false;
   }
@@ -51,6 +54,19 @@ MissionWish wait_and_arm(const MissionParams& p, const MissionInput& in, Mission
   return wish;
 }
 
+/// The sticks of a leg `t_s` after its start. They rest for the first second, so that a leg starts from hover.
+void move_sticks(const HoverLeg& leg, double t_s, MissionWish& wish) noexcept {
+  const auto wave = [t_s](float amplitude, float period_s) noexcept {
+    const double turns = std::max(0.0, t_s - 1.0) / static_cast<double>(period_s);
+    return amplitude * static_cast<float>(std::sin(2 * std::numbers::pi * turns));
+  };
+  constexpr float kRollPeriods = 1.37f;  // so that roll and pitch meet in all combinations
+  wish.yaw_rate_radps = wave(leg.yaw_amplitude_radps, leg.yaw_period_s);
+  wish.pitch_rad = wave(leg.tilt_amplitude_rad, leg.tilt_period_s);
+  wish.roll_rad = wave(leg.tilt_amplitude_rad, kRollPeriods * leg.tilt_period_s);
+  wish.target_m += wave(leg.bob_amplitude_m, leg.bob_period_s);
+}
+
 MissionWish fly_leg(const MissionParams& p, const MissionInput& in, MissionState& s, double in_phase_s) noexcept {
   const int leg = leg_of(s.phase);
   const bool last = p.follow_recording || leg + 1 >= p.leg_count;
@@ -61,6 +77,13 @@ MissionWish fly_leg(const MissionParams& p, const MissionInput& in, MissionState
   wish.rotors = !p.follow_recording || s.ground_height_m > 0.f;  // a recording is followed from its first height on
   wish.armed = true;
   wish.target_m = p.follow_recording ? s.ground_height_m : p.legs[static_cast<std::size_t>(leg)].height_m;
+  if (!p.follow_recording) {
+    const HoverLeg& row = p.legs[static_cast<std::size_t>(leg)];
+    wish.forward_mps = row.forward_mps;
+    wish.behaviours_climb = row.behaviours_climb;
+    move_sticks(row, in_phase_s, wish);
+  }
+  wish.steer = true;
   if (!in.armed)
     end_early(s, MissionPhase::kBroken, EarlyEnd::kDisarmed, in.now_ns);  // never armed again from here
   else if (in.stop_requested)
@@ -83,10 +106,11 @@ MissionWish mission_step(const MissionParams& p, const MissionInput& in, Mission
     case MissionPhase::kArm:
       return wait_and_arm(p, in, s, in_phase_s);
     case MissionPhase::kLand:
-      wish = {s.ground_height_m - kBelowGround_m, true, false, true};
+      wish.target_m = s.ground_height_m - kBelowGround_m;
+      wish.armed = wish.rotors = true;
       if (!in.armed)
         enter(s, MissionPhase::kDone, in.now_ns);
-      else if (standing_long_enough(in, s))
+      else if (standing_long_enough(p, in, s))
         enter(s, MissionPhase::kDisarm, in.now_ns);
       else if (in_phase_s > kLongestLanding_s)
         end_early(s, MissionPhase::kBroken, EarlyEnd::kNoGround, in.now_ns);

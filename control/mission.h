@@ -1,5 +1,6 @@
-// The mission as a list of heights to hold: arm, take off, hold each height for its time, land, disarm. It asks; the
-// flight mode decides. It arms once, on request, and never again by itself.
+// The mission as a list of legs: arm, take off, fly each leg for its time, land, disarm. A leg is a height to hold, a
+// forward speed, and a pilot's sticks as sines. It asks; the flight mode decides. It arms once, on request, and never
+// again by itself.
 #pragma once
 
 #include <array>
@@ -12,6 +13,11 @@ namespace wasp::control {
 struct HoverLeg {
   float height_m = 0.5f;
   float seconds = 40.f;
+  float forward_mps = 0.f;                              ///< along the heading; needs a measured velocity
+  float yaw_amplitude_radps = 0.f, yaw_period_s = 4.f;  ///< sticks: yaw rate ...
+  float tilt_amplitude_rad = 0.f, tilt_period_s = 3.f;  ///< ... pitch, and roll with 1.37 of the period
+  float bob_amplitude_m = 0.f, bob_period_s = 6.f;      ///< ... and height
+  bool behaviours_climb = false;                        ///< a behaviour's wish to climb moves the height
 };
 
 struct MissionParams {
@@ -20,6 +26,7 @@ struct MissionParams {
   std::array<HoverLeg, kMaxLegs> legs{};
   bool follow_recording = false;  ///< replay: arm, hold the height the recording shows, no take-off or landing
   float recording_seconds = 0.f;  ///< replay: length of the run
+  float landed_margin_m = 0.06f;  ///< this close to the standing height counts as standing
   float patience_s = 20.f;        ///< give up if the autopilot does not arm or the ground is not seen by then
 };
 
@@ -63,6 +70,10 @@ struct MissionState {
 /// What the mission wants at this tick.
 struct MissionWish {
   float target_m = 0;
+  float forward_mps = 0;
+  float yaw_rate_radps = 0, roll_rad = 0, pitch_rad = 0;  ///< sticks
+  bool behaviours_climb = false;
+  bool steer = false;   ///< on a leg: behaviours may turn the vehicle and set its pitch
   bool armed = false;   ///< ask the autopilot to be armed and to follow
   bool disarm = false;  ///< ask it to disarm
   bool rotors = false;  ///< false: zero thrust (standing on the ground)

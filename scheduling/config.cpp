@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <numbers>
 #include <span>
 #include <sstream>
 #include <utility>
@@ -101,18 +102,68 @@ void read_camera_down(TomlTable t, DownCameraConfig& c) {
   t.finish();
 }
 
+/// A number for each leg; angles are degrees in the file only.
+struct LegColumn {
+  const char* key;
+  double low, high;
+  void (*set)(control::HoverLeg&, float);
+  std::vector<double> values = {};
+};
+
+float radians(float degrees) { return degrees * std::numbers::pi_v<float> / 180.f; }
+
+std::vector<LegColumn> read_leg_columns(TomlTable& t) {
+  using Leg = control::HoverLeg;
+  std::vector<LegColumn> columns{
+      {"forward_mps", -3, 5, [](Leg& l, float v) { l.forward_mps = v; }},
+      {"yaw_amplitude_degps", 0, 180, [](Leg& l, float v) { l.yaw_amplitude_radps = radians(v); }},
+      {"yaw_period_s", 0.5, 1000, [](Leg& l, float v) { l.yaw_period_s = v; }},
+      {"tilt_amplitude_deg", 0, 30, [](Leg& l, float v) { l.tilt_amplitude_rad = radians(v); }},
+      {"tilt_period_s", 0.5, 1000, [](Leg& l, float v) { l.tilt_period_s = v; }},
+      {"bob_amplitude_m", 0, 5, [](Leg& l, float v) { l.bob_amplitude_m = v; }},
+      {"bob_period_s", 0.5, 1000, [](Leg& l, float v) { l.bob_period_s = v; }},
+      {"behaviours_climb", 0, 1, [](Leg& l, float v) { l.behaviours_climb = v != 0; }},
+  };
+  for (LegColumn& c : columns) t.numbers(c.key, c.values, c.low, c.high);
+  return columns;
+}
+
 void read_mission(TomlTable t, control::MissionParams& m) {
   std::vector<double> heights, seconds;
-  t.numbers("heights_m", heights, 0.3, 4.0);
+  t.numbers("heights_m", heights, 0.3, 20.0);
   t.numbers("seconds", seconds, 1, 36'000);
   t.number("patience_s", m.patience_s, 1, 600);
+  t.number("landed_margin_m", m.landed_margin_m, 0.01, 1);
+  const auto legs = read_leg_columns(t);
   t.finish();
   if (heights.empty() && seconds.empty()) return;
   if (heights.size() != seconds.size() || heights.size() > control::MissionParams::kMaxLegs)
     throw ConfigError("mission.heights_m and mission.seconds must have the same length, 1 to 8");
   m.leg_count = static_cast<int>(heights.size());
   for (std::size_t i = 0; i < heights.size(); ++i)
-    m.legs[i] = {static_cast<float>(heights[i]), static_cast<float>(seconds[i])};
+    m.legs[i].height_m = static_cast<float>(heights[i]), m.legs[i].seconds = static_cast<float>(seconds[i]);
+  for (const LegColumn& c : legs) {
+    if (c.values.empty()) continue;
+    if (c.values.size() != heights.size())
+      throw ConfigError(std::string("mission.") + c.key + " must have as many values as mission.heights_m");
+    for (std::size_t i = 0; i < c.values.size(); ++i) c.set(m.legs[i], static_cast<float>(c.values[i]));
+  }
+}
+
+void read_velocity(TomlTable& t, control::ControlParams& p) {
+  auto& hold = p.velocity_hold;
+  read_choice(t, "velocity_hold", hold.hold, {"off", "sideways", "both"});
+  t.number("velocity_kp_1ps", hold.kp_1ps, 0, 10);
+  t.number("velocity_ki_1ps2", hold.ki_1ps2, 0, 10);
+  t.number("velocity_max_accel_mps2", hold.max_accel_mps2, 0.1, 5);
+  t.number("velocity_ramp_mps2", hold.ramp_mps2, 0.05, 10);
+  t.number("avoid_hold_s", p.avoid_hold_s, 0, 36'000);
+  t.flag("hold_heading", p.hold_heading);
+  t.flag("barometer", p.barometer.enabled);
+  t.number("standing_height_m", p.barometer.standing_height_m, 0, 5);
+  t.number("min_height_m", p.min_height_m, 0.05, 100);
+  t.number("max_height_m", p.max_height_m, 0.1, 120);
+  if (p.min_height_m >= p.max_height_m) throw ConfigError("control.min_height_m must be below control.max_height_m");
 }
 
 void read_control(TomlTable t, Config& c) {
@@ -128,6 +179,7 @@ void read_control(TomlTable t, Config& c) {
   c.control.failsafe_action =
       action == "descend" ? control::FailsafeAction::kDescend : control::FailsafeAction::kStopStream;
   t.number("failsafe_thrust_share", c.control.failsafe_thrust_share, 0.5, 1.0);
+  read_velocity(t, c.control);
   auto& hold = c.control.altitude_hold;
   t.number("mass_kg", hold.mass_kg, 0.05, 50);
   t.number("full_thrust_n", hold.full_thrust_n, 0.5, 2000);
@@ -135,6 +187,7 @@ void read_control(TomlTable t, Config& c) {
   t.number("ki_npms", hold.ki_npms, 0, 1000);
   t.number("kd_nspm", hold.kd_nspm, 0, 1000);
   t.number("max_climb_mps", hold.max_climb_mps, 0.05, 5);
+  t.number("max_correction_n", hold.max_correction_n, 0.1, 1000);
   double tilt_deg = to_degrees(Radians{static_cast<double>(c.control.limits.max_tilt_rad)}).value;
   t.number("max_tilt_deg", tilt_deg, 1, 45);
   c.control.limits.max_tilt_rad = static_cast<float>(to_radians(Degrees{tilt_deg}).value);
@@ -151,7 +204,9 @@ void read_behaviours(TomlTable t, Config& c, bool foreign_behaviours) {
     read_thread(b, c.behaviours[i]);
     read_choice(b, "frames", c.behaviours[i].frames_in_order, {"newest", "in_order"});
     read_milliseconds(b, "age_limit_ms", row.age_limit_ns);
-    b.number("height_rank", row.height_rank, -1, 15);
+    b.number("height_rank", row.height_rank, -1, 23);
+    b.number("velocity_rank", row.velocity_rank, -1, 23);
+    b.number("climb_rank", row.climb_rank, -1, 23);
     b.number("heading_weight", row.heading_weight, 0, 100);
     b.number("pitch_weight", row.pitch_weight, 0, 100);
     c.behaviour_params[i].merge(b.table("params"));

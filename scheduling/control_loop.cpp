@@ -111,10 +111,13 @@ void ControlLoop::mean_acceleration(control::ControlInput& input) WASP_REALTIME 
   ImuSample sample;
   int n = 0;
   std::array<float, 3> sum{};
+  float pressure = 0;
   for (std::uint32_t i = 0; i < shm::kImuSlots && imu_.read(sample); ++i) {
     for (std::size_t k = 0; k < 3; ++k) sum[k] += sample.accel_body_mps2[k];
+    pressure += sample.pressure_hpa;
     ++n;
   }
+  input.pressure_hpa = n > 0 ? pressure / static_cast<float>(n) : 0.f;
   input.accel_present = n > 0;
   for (std::size_t k = 0; n > 0 && k < 3; ++k) input.accel_body_mps2[k] = sum[k] / static_cast<float>(n);
 }

@@ -107,6 +107,7 @@ AttitudeSetpoint FlightController::active_setpoint(float dt_s) {
   AttitudeSetpoint setpoint = setpoint_;
   setpoint.euler.roll_rad += trim_roll_rad_;
   setpoint.euler.pitch_rad += trim_pitch_rad_;
+  setpoint.yaw_rate_radps += trim_yaw_rate_radps_;
   return setpoint;
 }
 

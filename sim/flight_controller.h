@@ -33,8 +33,10 @@ class FlightController {
   /// Disarming in flight needs `force`; arming needs a settled estimate and ground under the legs.
   CommandResult arm(bool armed, bool force);
   CommandResult set_mode(std::uint32_t custom_mode);
-  /// Small corrections a safety pilot adds to the companion's roll and pitch [rad].
-  void set_trim(float roll_rad, float pitch_rad) { trim_roll_rad_ = roll_rad, trim_pitch_rad_ = pitch_rad; }
+  /// Small corrections a safety pilot adds to the companion's roll and pitch [rad] and yaw rate [rad/s].
+  void set_trim(float roll_rad, float pitch_rad, float yaw_rate_radps = 0) {
+    trim_roll_rad_ = roll_rad, trim_pitch_rad_ = pitch_rad, trim_yaw_rate_radps_ = yaw_rate_radps;
+  }
 
   [[nodiscard]] bool armed() const { return armed_; }
   [[nodiscard]] bool descending() const { return descending_; }  ///< without a companion
@@ -62,7 +64,7 @@ class FlightController {
   TimeNs setpoint_at_ns_ = kLongAgo, grounded_since_ns_ = kLongAgo, mode_since_ns_ = kLongAgo, now_ns_ = kLongAgo;
   ControllerMode mode_ = ControllerMode::kManual;
   bool armed_ = false, descending_ = false, on_ground_ = true;
-  float trim_roll_rad_ = 0, trim_pitch_rad_ = 0;
+  float trim_roll_rad_ = 0, trim_pitch_rad_ = 0, trim_yaw_rate_radps_ = 0;
   float descent_integral_ = 0, descent_yaw_rad_ = 0;
   std::string_view event_;
 };

@@ -12,6 +12,7 @@ struct BodyPose {
   Quat q_ned_body = Quat::Identity();
   Vec3 velocity_ned_mps = Vec3::Zero();
   Vec3 rate_body_radps = Vec3::Zero();
+  double flight_time_s = 0;  ///< since the vehicle first left the ground: the time of what moves in the world
 };
 
 /// Pose at `at_ns` between (or a little beyond) two others; needs a.at_ns != b.at_ns unless they are the same pose.
@@ -24,6 +25,7 @@ inline BodyPose interpolate(const BodyPose& a, const BodyPose& b, TimeNs at_ns) 
   pose.q_ned_body = a.q_ned_body.slerp(t, b.q_ned_body);
   pose.velocity_ned_mps = a.velocity_ned_mps + t * (b.velocity_ned_mps - a.velocity_ned_mps);
   pose.rate_body_radps = a.rate_body_radps + t * (b.rate_body_radps - a.rate_body_radps);
+  pose.flight_time_s = a.flight_time_s + static_cast<double>(t) * (b.flight_time_s - a.flight_time_s);
   return pose;
 }
 

@@ -1,11 +1,13 @@
-// Ray-traced images of a world: one coherent cast (Embree, packets of 4 x 4 pixels) yields intensity and true depth.
-// A ray's direction has unit length along the optical axis, so its hit parameter is the optical-axis depth itself.
-// Shading: the surface's brightness times its texture at the right mipmap level.
+// Ray-traced images of a world: coherent casts (Embree, packets of 4 x 4 pixels) yield intensity, true depth and which
+// face each pixel sees. Faces are flat, so an edge of the geometry is exactly where neighbouring pixels see different
+// faces: there, if asked, a pixel becomes the mean of four rays on a rotated grid. Depth stays that of the centre ray.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <vector>
 
+#include "sim/camera_rays.h"
 #include "sim/world_scene.h"
 #include "types/camera.h"
 
@@ -17,34 +19,55 @@ struct CameraPose {
   Mat3 R_ned_cam = Mat3::Identity();
 };
 
+/// One image as cast, row-major, height_px x width_px.
+struct CastFrame {
+  explicit CastFrame(std::size_t pixels = 0) : luminance(pixels), range(pixels), face(pixels) {}
+  std::vector<float> luminance;     ///< pixel values, 0 ... about 255, not clamped
+  std::vector<float> range;         ///< ray parameter: a pinhole's depth, a fisheye's distance [m]; 0: nothing hit
+  std::vector<std::uint32_t> face;  ///< which face; kNoFace: none, kUnseen: beyond the lens' field
+  static constexpr std::uint32_t kNoFace = ~0u, kUnseen = ~0u - 1;
+};
+
 class Renderer {
  public:
   static constexpr int kBandRows = 4;
 
-  /// Builds the acceleration structure; keeps the world. Image width and height must be multiples of 4.
-  /// Throws std::runtime_error when they are not or Embree fails. Distortion is inverted once, for every pixel.
+  /// Throws std::runtime_error when the sizes are not multiples of 4, the lens is unusable, or Embree fails.
+  Renderer(std::shared_ptr<const WorldScene> scene, const Lens& lens, float field_of_view_rad);
+  /// A pinhole in a world of its own.
   Renderer(World world, const Intrinsics& intrinsics);
-  /// The same into a world that other cameras see too.
-  Renderer(std::shared_ptr<const WorldScene> scene, const Intrinsics& intrinsics);
 
-  /// Rows [first_row, first_row + kBandRows): `luminance` in pixel values (0 ... about 255, not clamped), `depth_m`
-  /// along the optical axis (0 where nothing is hit); both row-major, kBandRows x width. first_row is a multiple of
-  /// kBandRows.
+  /// A frame of this renderer's size.
+  [[nodiscard]] CastFrame frame() const;
+  /// One ray for each pixel. Allocates nothing, as nothing below.
+  void cast(const CameraPose& pose, CastFrame& frame) const;
+  /// Smooths the edges of a frame just cast from `pose`. One thread at a time.
+  void antialias(const CameraPose& pose, CastFrame& frame);
+  /// Rows [first_row, first_row + kBandRows) of a cast: luminance and optical-axis depth (0 where nothing is hit and,
+  /// with a fisheye, at right angles to the axis and behind); both row-major, kBandRows x width. first_row is a
+  /// multiple of kBandRows.
   void render_band(const CameraPose& pose, int first_row, float* luminance, float* depth_m) const;
+  /// Optical-axis depth of row v from its ray parameters; `range` and `depth_m` may be the same.
+  void depth_row(int v, const float* range, float* depth_m) const;
 
-  [[nodiscard]] int width_px() const { return intrinsics_.width_px; }
-  [[nodiscard]] int height_px() const { return intrinsics_.height_px; }
-  [[nodiscard]] const Intrinsics& intrinsics() const { return intrinsics_; }
+  [[nodiscard]] int width_px() const { return rays_.width_px(); }
+  [[nodiscard]] int height_px() const { return rays_.height_px(); }
+  /// Where parts of the world move, hold its `at` while casting.
+  [[nodiscard]] const WorldScene& scene() const { return *scene_; }
+  [[nodiscard]] const CameraRays& rays() const { return rays_; }
+  /// Pixels with an edge in the frame last smoothed.
+  [[nodiscard]] std::size_t edge_pixels() const { return edges_.size(); }
 
  private:
-  struct Packet {
-    float x[16], y[16];  ///< normalised image coordinates of 4 x 4 pixels
-  };
-  void build_rays();
+  void cast_band(const CameraPose& pose, int first_row, float* luminance, float* range, std::uint32_t* face) const;
+  void find_edges(const CastFrame& frame);
+  float aim(RayPacket& rays, std::uint32_t at, std::size_t k, bool used) const;
 
   std::shared_ptr<const WorldScene> scene_;
-  Intrinsics intrinsics_;
-  std::vector<Packet> packets_;  ///< by block row, then block column
+  CameraRays rays_;
+  std::vector<float> axis_;          ///< CameraRays::axis of each pixel; empty for a pinhole
+  std::vector<std::uint8_t> marks_;  ///< a row of scratch: 1 where a pixel has an edge
+  std::vector<std::uint32_t> edges_;
 };
 
 }  // namespace wasp::sim

@@ -5,6 +5,7 @@
 
 #include "sim/random.h"
 #include "sim/scene_generators.h"
+#include "sim/walker.h"
 
 namespace wasp::sim {
 namespace {
@@ -47,9 +48,11 @@ class Builder {
     wall({x0, y - kW / 2, 0}, {x1, y - kW / 2, 0});
     wall({x0, y + kW / 2, 0}, {x1, y + kW / 2, 0});
   }
-  void carton(float x, float y, const Vec3& size) {
-    world_.add_box({x, y, 0}, size, between(-0.3, 0.3), {kCarton, 0.7f, between(0.7, 1.2)});
+  void carton(float x, float y, const Vec3& size) { carton(x, y, size, between(-0.3, 0.3)); }
+  void carton(float x, float y, const Vec3& size, float yaw_rad) {
+    world_.add_box({x, y, 0}, size, yaw_rad, {kCarton, 0.7f, between(0.7, 1.2)});
   }
+  Random& random() { return random_; }
   Scene finish(const char* title) { return {std::move(world_), Vec3::Zero(), 0, title}; }
 
  private:
@@ -108,6 +111,24 @@ Scene make_corridor_obstacles(std::uint32_t seed) {
     if (b.between(0, 1) < 0.7f) side = -side;
   }
   return b.finish("corridor-obstacles");
+}
+
+/// Cartons keep to one wall, people to the other, so that at least 1.2 m stay free between them. Each walks a half of
+/// the corridor to and fro: one comes along the vehicle's way first, the other towards it.
+Scene make_corridor_people(std::uint32_t seed) {
+  Builder b = straight(seed);
+  const float side = b.between(0, 1) < 0.5f ? -1.f : 1.f;
+  for (float x = b.between(4, 6); x < kCorridorLength_m - 4; x += b.between(3, 5)) {
+    const float reach = b.between(0.35, 0.6), tall = b.between(0.6, 2.2);
+    b.carton(x, side * (kW / 2 - reach / 2), {b.between(0.3, 0.5), reach, tall}, 0);
+  }
+  const float lane = -side * (kW / 2 - 0.1f - kWalkerWidth_m / 2), inwards = side * std::numbers::pi_v<float> / 2;
+  for (const bool first : {true, false})
+    add_walker(
+        b.world(), first ? "walker_near" : "walker_far",
+        {first ? 4.f : 15.f, first ? 14.f : 27.f, lane, b.between(0.4, 0.8), b.between(0.2, 0.8), first, inwards},
+        b.random());
+  return b.finish("corridor-people");
 }
 
 /// Four by three rooms of 5 m x 4 m; every inner wall has a doorway of 1 m. The start is the first room's middle.

@@ -32,6 +32,18 @@ double facade(double u, double v, std::uint32_t seed) {
   return 0.62 + 0.2 * (tile_noise(u, v, 32, seed + 3) - 0.5);
 }
 
+/// Two windows in a plain wall.
+double few_windows(double u, double v, std::uint32_t seed) {
+  const bool glass = v > 0.3 && v < 0.62 && ((u > 0.12 && u < 0.36) || (u > 0.62 && u < 0.86));
+  return glass ? 0.3 : 0.8 + 0.12 * (tile_noise(u, v, 16, seed) - 0.5);
+}
+
+/// Check with a weave in it: clothes.
+double cloth(double u, double v, std::uint32_t seed) {
+  const double check = (std::fmod(u * 8, 1.0) < 0.5 ? 0.12 : 0.0) + (std::fmod(v * 8, 1.0) < 0.4 ? 0.14 : 0.0);
+  return 0.4 + check + 0.35 * (natural(u, v, seed) - 0.5);
+}
+
 /// One sheet in four has a dark heading.
 double notices(double u, double v, std::uint32_t seed) {
   const auto sheet = static_cast<std::uint32_t>(u * 4) + 4 * static_cast<std::uint32_t>(v * 4);
@@ -64,6 +76,9 @@ World empty_world(std::uint32_t seed) {
   w.textures.push_back(paint(kSide, [s](double u, double v) {
     return (std::abs(u - 0.5) < 0.06 ? 0.75 : 0.5) + 0.25 * (natural(u, v, s + 700) - 0.5);
   }));
+  w.textures.push_back(paint(kSide, [s](double u, double v) { return few_windows(u, v, s + 800); }));
+  w.textures.push_back(paint(kSide, [s](double u, double v) { return 0.5 + 0.16 * (natural(u, v, s + 900) - 0.5); }));
+  w.textures.push_back(paint(kSide, [s](double u, double v) { return cloth(u, v, s + 950); }));
   return w;
 }
 

@@ -9,8 +9,7 @@ namespace wasp::sim {
 namespace {
 
 World world_of(const SimConfig& config) {
-  if (!config.world_file.empty()) return placed_at_start(read_vrml(config.world_file));
-  return make_lab({config.seed, config.floor_edges_per_m, config.cartons});
+  return placed_at_start(config.world_file.empty() ? generated_scene(config) : read_vrml(config.world_file));
 }
 
 }  // namespace
@@ -27,28 +26,34 @@ SimCamera::SimCamera(const SimConfig& config)
 SimCamera::SimCamera(std::shared_ptr<const WorldScene> scene, const CameraSetup& setup, const SensorParams& sensor,
                      std::uint32_t seed)
     : geometry_(setup.geometry),
-      renderer_(std::move(scene), setup.geometry.intrinsics),
+      optics_(setup.optics),
+      renderer_(std::move(scene), setup.geometry.lens(), setup.optics.field_of_view_rad),
       sensor_(sensor, setup.geometry.intrinsics.width_px, setup.geometry.intrinsics.fx_px, seed),
-      luminance_(static_cast<std::size_t>(renderer_.width_px()) * Renderer::kBandRows),
-      depth_m_(luminance_.size()) {}
-
-CameraPose SimCamera::camera_pose(const BodyPose& pose) const {
-  return {pose.position_ned_m + pose.q_ned_body * geometry_.position_body_m,
-          pose.q_ned_body.toRotationMatrix() * geometry_.R_body_cam};
+      frame_(renderer_.frame()),
+      depth_m_(static_cast<std::size_t>(renderer_.width_px())) {
+  const OpticsParams& o = setup.optics;
+  if (o.exposure_s > 0) exposure_.emplace(geometry_, o.exposure_s, o.antialias, renderer_);
+  if (o.aperture_m > 0) defocus_.emplace(o, geometry_.intrinsics.fx_px, renderer_.width_px(), renderer_.height_px());
 }
+
+CameraPose SimCamera::camera_pose(const BodyPose& pose) const { return camera_pose_of(pose, geometry_); }
 
 void SimCamera::render(const BodyPose& pose, std::uint32_t frame, std::uint8_t* gray, std::uint16_t* depth_mm,
                        const std::function<void()>& almost_done) {
   const CameraPose camera = camera_pose(pose);
+  const WorldScene::Moment moment = renderer_.scene().at(pose.flight_time_s);
+  renderer_.cast(camera, frame_);
+  if (optics_.antialias) renderer_.antialias(camera, frame_);
+  if (exposure_) exposure_->apply(renderer_, pose, frame_);
+  if (defocus_) defocus_->apply(frame_);
   const auto width = static_cast<std::size_t>(renderer_.width_px());
-  for (int band = 0; band < renderer_.height_px(); band += Renderer::kBandRows) {
-    renderer_.render_band(camera, band, luminance_.data(), depth_m_.data());
-    for (int i = 0; i < Renderer::kBandRows; ++i) {
-      const std::size_t from = static_cast<std::size_t>(i) * width, to = static_cast<std::size_t>(band + i) * width;
-      if (almost_done && band + i == renderer_.height_px() - kLastRows) almost_done();
-      sensor_.gray_row(frame, band + i, luminance_.data() + from, gray + to);
-      if (depth_mm != nullptr) sensor_.depth_row(frame, band + i, depth_m_.data() + from, depth_mm + to);
-    }
+  for (int row = 0; row < renderer_.height_px(); ++row) {
+    const std::size_t at = static_cast<std::size_t>(row) * width;
+    if (almost_done && row == renderer_.height_px() - kLastRows) almost_done();
+    sensor_.gray_row(frame, row, frame_.luminance.data() + at, gray + at);
+    if (depth_mm == nullptr) continue;
+    renderer_.depth_row(row, frame_.range.data() + at, depth_m_.data());
+    sensor_.depth_row(frame, row, depth_m_.data(), depth_mm + at);
   }
 }
 

@@ -4,8 +4,11 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <vector>
 
+#include "sim/defocus.h"
+#include "sim/exposure.h"
 #include "sim/pose.h"
 #include "sim/renderer.h"
 #include "sim/sensor_model.h"
@@ -37,15 +40,21 @@ class SimCamera {
   static constexpr int kLastRows = 4;  ///< some 10 to 40 us; a sleeping reader wakes up in about 10
 
   [[nodiscard]] CameraPose camera_pose(const BodyPose& pose) const;
+  /// The image before the sensor, as the last render left it.
+  [[nodiscard]] const CastFrame& ideal() const { return frame_; }
   [[nodiscard]] const Renderer& renderer() const { return renderer_; }
   [[nodiscard]] int width_px() const { return renderer_.width_px(); }
   [[nodiscard]] int height_px() const { return renderer_.height_px(); }
 
  private:
   CameraGeometry geometry_;
+  OpticsParams optics_;
   Renderer renderer_;
   SensorModel sensor_;
-  std::vector<float> luminance_, depth_m_;
+  CastFrame frame_;
+  std::optional<Exposure> exposure_;  ///< with an open shutter
+  std::optional<Defocus> defocus_;    ///< with an aperture
+  std::vector<float> depth_m_;        ///< one row
 };
 
 }  // namespace wasp::sim

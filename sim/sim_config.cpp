@@ -93,6 +93,67 @@ void add_camera_rows(std::vector<Row>& rows, const char* s, CameraOf of) {
     if (std::string_view(r.key) == "lens") r.words = {"pinhole", "fisheye"};
 }
 
+/// A key whose value is one of `words`; `take` gets its place among them.
+Row word_row(const char* section, const char* key, std::vector<std::string> words, void (*take)(Draft&, std::size_t)) {
+  const auto last = static_cast<double>(words.size() - 1);
+  return {section,         key, 0, last, [take](Draft& d, double i) { take(d, static_cast<std::size_t>(i)); },
+          std::move(words)};
+}
+
+/// The configuration of table A.4, with its camera's place.
+void take_preset(Draft& d, std::size_t i) {
+  const VehiclePreset& preset = kVehiclePresets[i];
+  d.config.vehicle = preset.params();
+  d.pitch_down_deg = preset.camera_pitch_down_deg;
+  d.config.camera.position_body_m =
+      Vec3(static_cast<float>(preset.camera_forward_m), 0, static_cast<float>(preset.camera_below_m));
+}
+
+void add_vehicle_rows(std::vector<Row>& rows) {
+  using D = Draft;
+  constexpr double kDegree = std::numbers::pi / 180;
+  std::vector<std::string> presets;
+  for (const VehiclePreset& p : kVehiclePresets) presets.emplace_back(p.name);
+  // clang-format off
+  rows.insert(rows.end(), {
+      word_row("vehicle", "preset", presets, &take_preset),
+      row<double>("vehicle", "mass_kg", 0.5, 2.2, [](D& d) -> double& { return d.config.vehicle.mass_kg; }),
+      row<double>("vehicle", "drag_Npmps", 0, 5, [](D& d) -> double& { return d.config.vehicle.drag_Npmps; }),
+      row<double>("pilot", "cruise_mps", 0, 5, [](D& d) -> double& { return d.config.pilot.cruise_mps; }),
+      row<double>("pilot", "cruise_distance_m", 0, 1e4, [](D& d) -> double& { return d.config.pilot.cruise_distance_m; }),
+      row<bool>("pilot", "hold_heading", 0, 1, [](D& d) -> bool& { return d.config.pilot.hold_heading; }),
+      row<double>("wind", "mean_mps", 0, 20, [](D& d) -> double& { return d.config.wind.mean_mps; }),
+      {"wind", "mean_direction_deg", -360, 360, [](D& d, double v) { d.config.wind.from_rad = v * kDegree; }},
+      row<double>("wind", "gust_mps", 0, 10, [](D& d) -> double& { return d.config.wind.gust_mps; }),
+      row<double>("wind", "gust_time_s", 0.05, 600, [](D& d) -> double& { return d.config.wind.gust_time_s; }),
+      row<bool>("stand", "turntable", 0, 1, [](D& d) -> bool& { return d.config.stand.turntable; }),
+      row<double>("stand", "height_m", 0.05, 20, [](D& d) -> double& { return d.config.stand.height_m; }),
+      {"stand", "amplitude_degps", 0, 360, [](D& d, double v) { d.config.stand.amplitude_radps = v * kDegree; }},
+      row<double>("stand", "period_s", 0.5, 600, [](D& d) -> double& { return d.config.stand.period_s; }),
+      row<double>("stand", "start_s", 0, 600, [](D& d) -> double& { return d.config.stand.start_s; }),
+      word_row("stand", "profile", {"sine", "steps"},
+               [](D& d, std::size_t i) { d.config.stand.profile = static_cast<StandProfile>(i); }),
+  });
+  // clang-format on
+}
+
+void add_world_rows(std::vector<Row>& rows) {
+  using D = Draft;
+  std::vector<std::string> kinds;
+  for (const SceneKind& k : scene_kinds()) kinds.emplace_back(k.name);
+  // clang-format off
+  rows.insert(rows.end(), {
+      word_row("world", "kind", kinds, [](D& d, std::size_t i) { d.config.world_kind = scene_kinds()[i].name; }),
+      row<double>("world", "floor_edges_per_m", 0.05, 20,
+          [](D& d) -> double& { return d.config.world.floor_edges_per_m; }),
+      row<int>("world", "cartons", 0, 40, [](D& d) -> int& { return d.config.world.cartons; }),
+      row<double>("world", "ground_edges_per_m", 0.02, 20,
+          [](D& d) -> double& { return d.config.world.ground_edges_per_m; }),
+      row<double>("world", "arena_step_at_s", 0, 600, [](D& d) -> double& { return d.config.world.arena_step_at_s; }),
+  });
+  // clang-format on
+}
+
 std::vector<Row> make_rows() {
   using D = Draft;
   // clang-format off
@@ -100,8 +161,6 @@ std::vector<Row> make_rows() {
       row<std::uint32_t>("run", "seed", 0, 4294967295.0, [](D& d) -> std::uint32_t& { return d.config.seed; }),
       row<bool>("run", "safety_pilot", 0, 1, [](D& d) -> bool& { return d.config.safety_pilot; }),
       row<double>("run", "clock_offset_s", 0, 1e6, [](D& d) -> double& { return d.config.clock_offset_s; }),
-      row<double>("vehicle", "mass_kg", 0.5, 2.2, [](D& d) -> double& { return d.config.vehicle.mass_kg; }),
-      row<double>("vehicle", "drag_Npmps", 0, 5, [](D& d) -> double& { return d.config.vehicle.drag_Npmps; }),
       row<double>("imu", "gyro_noise_radps", 0, 1, [](D& d) -> double& { return d.config.imu.gyro_noise_radps; }),
       row<double>("imu", "gyro_bias_radps", 0, 1, [](D& d) -> double& { return d.config.imu.gyro_bias_radps; }),
       row<double>("imu", "gyro_walk_radps_sqrts", 0, 0.1,
@@ -122,10 +181,10 @@ std::vector<Row> make_rows() {
       row<float>("sensor", "gain", 0.01, 20, [](D& d) -> float& { return d.config.sensor.gain; }),
       row<float>("sensor", "read_noise", 0, 100, [](D& d) -> float& { return d.config.sensor.read_noise; }),
       row<float>("sensor", "photon_noise", 0, 10, [](D& d) -> float& { return d.config.sensor.photon_noise; }),
-      row<double>("world", "floor_edges_per_m", 0.05, 20, [](D& d) -> double& { return d.config.floor_edges_per_m; }),
-      row<int>("world", "cartons", 0, 40, [](D& d) -> int& { return d.config.cartons; }),
   };
   // clang-format on
+  add_vehicle_rows(rows);
+  add_world_rows(rows);
   add_camera_rows(rows, "camera", front_of);
   add_camera_rows(rows, "camera_down", down_of);
   return rows;
@@ -213,6 +272,12 @@ SimConfig::SimConfig() {
   down.setup.optics.field_of_view_rad = static_cast<float>(to_radians(Degrees{170}).value);
 }
 
+Scene generated_scene(const SimConfig& config) {
+  SceneOptions options = config.world;
+  options.seed = config.seed;
+  return make_scene(config.world_kind, options);
+}
+
 SimConfig parse_sim_config(const std::string& toml_text, const std::string& name) {
   std::istringstream stream(toml_text);
   toml::value document;
@@ -222,10 +287,12 @@ SimConfig parse_sim_config(const std::string& toml_text, const std::string& name
     fail(name, error.what());
   }
   Draft draft;
-  for (const auto& [section, table] : document.as_table()) {
-    if (!table.is_table()) fail(name, "unknown key '" + section + "' outside any section");
-    for (const auto& [key, value] : table.as_table()) apply(draft, section, key, value, name);
-  }
+  for (const bool preset : {true, false})  // it sets what other keys then change
+    for (const auto& [section, table] : document.as_table()) {
+      if (!table.is_table()) fail(name, "unknown key '" + section + "' outside any section");
+      for (const auto& [key, value] : table.as_table())
+        if ((section == "vehicle" && key == "preset") == preset) apply(draft, section, key, value, name);
+    }
   draft.config.camera.R_body_cam = R_body_cam_from_pitch_down(to_radians(Degrees{draft.pitch_down_deg}));
   draft.config.down.setup.geometry.R_body_cam =
       R_body_cam_from_pitch_down(to_radians(Degrees{draft.down_pitch_down_deg}));

@@ -7,9 +7,12 @@
 #include <vector>
 
 #include "sim/imu_model.h"
-#include "sim/lab_world.h"
 #include "sim/optics.h"
+#include "sim/safety_pilot.h"
+#include "sim/scene.h"
 #include "sim/sensor_model.h"
+#include "sim/stand.h"
+#include "sim/wind.h"
 #include "types/camera.h"
 
 namespace wasp::sim {
@@ -24,17 +27,20 @@ struct DownCamera {
 struct SimConfig {
   std::uint32_t seed = 1;
   bool safety_pilot = true;
+  PilotParams pilot;
   double clock_offset_s = 1000.25;  ///< autopilot clock minus the simulator's, 0 ... 1e6
   double camera_rate_hz = 30;       ///< 1 ... 120
   CameraGeometry camera;            ///< the front one
   OpticsParams optics;              ///< of the front camera
   DownCamera down;
   VehicleParams vehicle;
+  WindParams wind;
+  StandParams stand;
   ImuParams imu;
   SensorParams sensor;
-  double floor_edges_per_m = 3.1;
-  int cartons = 9;
-  std::string world_file;  ///< VRML97 to fly in instead of the laboratory; empty: the laboratory
+  std::string world_kind = "laboratory";  ///< one of scene_kinds()
+  SceneOptions world;                     ///< its seed is not used: `seed` above decides
+  std::string world_file;                 ///< VRML97 to fly in instead; empty: the kind above
 
   /// The Kinect of the thesis: 640 x 480, f = 525 px, pitched down by 30 degrees, 5 cm ahead of the centre of mass; and
   /// a fisheye of 170 degrees, 320 x 240, below it that looks straight down (not enabled).
@@ -42,6 +48,9 @@ struct SimConfig {
 
   [[nodiscard]] CameraSetup front() const { return {camera, optics}; }
 };
+
+/// The generated scene that the configuration asks for (world_file apart). Throws as make_scene does.
+Scene generated_scene(const SimConfig& config);
 
 /// Reads a TOML file over the defaults. Throws std::runtime_error naming the file and the key or line.
 SimConfig load_sim_config(const std::string& path);

@@ -22,7 +22,7 @@ using namespace wasp;
 using namespace wasp::sim;
 
 struct Options {
-  std::string instance = "wasp", tty_link, config_path, world_file;
+  std::string instance = "wasp", tty_link, config_path, world_kind, world_file;
   std::optional<std::uint32_t> seed;
   std::optional<double> rate_hz;
   bool no_camera = false, no_safety_pilot = false;
@@ -34,8 +34,11 @@ void declare(CLI::App& app, Options& o) {
       ->capture_default_str();
   app.add_option("--tty-link", o.tty_link, "symbolic link to make to the autopilot's serial line")->required();
   app.add_option("--config", o.config_path, "TOML file; see share/wasp/config/sim.toml for every key");
-  app.add_option("--world", o.world_file, "VRML97 file to fly in (`wasp world make`); default: the laboratory")
+  app.add_option("--world", o.world_file, "VRML97 file to fly in (`wasp world make`); default: world.kind")
       ->check(CLI::ExistingFile);
+  app.add_option("--world-kind", o.world_kind,
+                 "generated world to fly in, see `wasp world list` (default: world.kind of the configuration)")
+      ->excludes("--world");
   app.add_option("--seed", o.seed, "seed of world, sensors and vehicle (default: run.seed of the configuration)");
   app.add_option("--rate-hz", o.rate_hz, "camera rate (default: camera.rate_hz of the configuration)")
       ->check(CLI::Range(1.0, 120.0));
@@ -52,6 +55,9 @@ void declare(CLI::App& app, Options& o) {
 SimConfig settings(const Options& o) {
   SimConfig config = o.config_path.empty() ? SimConfig{} : load_sim_config(o.config_path);
   config.world_file = o.world_file;
+  if (!o.world_kind.empty()) config.world_kind = o.world_kind;
+  if (find_scene_kind(config.world_kind) == nullptr)
+    throw std::runtime_error("--world-kind " + config.world_kind + ": known are " + scene_kind_names());
   if (o.seed) config.seed = *o.seed;
   if (o.rate_hz) config.camera_rate_hz = *o.rate_hz;
   if (o.no_safety_pilot) config.safety_pilot = false;

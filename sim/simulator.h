@@ -38,21 +38,26 @@ class Simulator {
 
   [[nodiscard]] Truth truth() const;
   [[nodiscard]] BodyPose pose() const;
+  /// Since the vehicle first left the ground (on the turntable: since it was first armed) [s]; 0 before.
+  [[nodiscard]] double flight_time_s() const;
   [[nodiscard]] const FlightController& flight() const { return flight_; }
   [[nodiscard]] const Vehicle& vehicle() const { return vehicle_; }
   [[nodiscard]] const AutopilotLink& link() const { return link_; }
 
  private:
+  void physics_step();
   void control_tick();
 
   Vec3 camera_body_m_;
+  StandParams stand_;
   Vehicle vehicle_;
+  Wind wind_;
   ImuModel imu_;
   FlightController flight_;
   AutopilotLink link_;
   SafetyPilot pilot_;
   std::array<double, 4> wanted_radps_{};
-  TimeNs now_ns_;
+  TimeNs start_ns_, now_ns_, took_off_ns_ = kNever;
   std::uint64_t physics_steps_ = 0;
 };
 

@@ -1,7 +1,6 @@
 #include "sim/texture.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 
 #include "sim/random.h"
@@ -27,6 +26,16 @@ double octave(double u, double v, int period, std::uint32_t seed) {
   return std::lerp(top, bottom, b);
 }
 
+std::vector<std::uint8_t> halved(const std::vector<std::uint8_t>& from, std::size_t n) {
+  std::vector<std::uint8_t> to(n * n / 4);
+  for (std::size_t y = 0; y < n; y += 2)
+    for (std::size_t x = 0; x < n; x += 2) {
+      const std::uint8_t* t = from.data() + y * n + x;
+      to[y / 2 * (n / 2) + x / 2] = static_cast<std::uint8_t>((t[0] + t[1] + t[n] + t[n + 1] + 2) / 4);
+    }
+  return to;
+}
+
 }  // namespace
 
 double tile_noise(double u, double v, int period, std::uint32_t seed) {
@@ -34,36 +43,30 @@ double tile_noise(double u, double v, int period, std::uint32_t seed) {
          0.2 * octave(u, v, 4 * period, seed + 2);
 }
 
-Texture::Level Texture::make_level(int size_px) {
-  const auto n = static_cast<std::uint32_t>(size_px);
-  Level level;
-  level.size = static_cast<float>(size_px);
-  level.mask = n - 1;
-  level.shift = static_cast<std::uint32_t>(std::countr_zero(n));
-  level.wrap = n * n - 1;
-  level.texels.resize(n * n);
-  return level;
-}
-
-Texture::Level Texture::halve(const Level& from) {
-  const auto n = static_cast<std::size_t>(from.size);
-  Level to = make_level(static_cast<int>(n / 2));
-  for (std::size_t y = 0; y < n; y += 2)
-    for (std::size_t x = 0; x < n; x += 2) {
-      const std::uint8_t* t = from.texels.data() + y * n + x;
-      to.texels[y / 2 * (n / 2) + x / 2] = static_cast<std::uint8_t>((t[0] + t[1] + t[n] + t[n + 1] + 2) / 4);
-    }
-  return to;
+void Texture::append(const std::vector<std::uint8_t>& level, std::size_t n) {
+  constexpr std::size_t kBehind = 3;
+  offsets_.push_back(static_cast<std::int32_t>(texels_.empty() ? 0 : texels_.size() - kBehind));
+  if (!texels_.empty()) texels_.resize(texels_.size() - kBehind);
+  for (std::size_t y = 0; y < n; ++y) {
+    const auto row = level.begin() + static_cast<std::ptrdiff_t>(y * n);
+    texels_.insert(texels_.end(), row, row + static_cast<std::ptrdiff_t>(n));
+    texels_.push_back(*row);
+  }
+  texels_.resize(texels_.size() + kBehind);
 }
 
 Texture::Texture(int size_px, const std::function<double(int, int)>& shade) : size_px_(size_px) {
-  Level base = make_level(size_px);
+  auto n = static_cast<std::size_t>(size_px);
+  std::vector<std::uint8_t> level(n * n);
   for (int v = 0; v < size_px; ++v)
     for (int u = 0; u < size_px; ++u)
-      base.texels[static_cast<std::size_t>(v) * static_cast<std::size_t>(size_px) + static_cast<std::size_t>(u)] =
+      level[static_cast<std::size_t>(v) * n + static_cast<std::size_t>(u)] =
           static_cast<std::uint8_t>(std::lround(std::clamp(shade(u, v), 0.0, 1.0) * 255));
-  levels_.push_back(std::move(base));
-  while (levels_.back().size > 1) levels_.push_back(halve(levels_.back()));
+  append(level, n);
+  for (; n > 1; n /= 2) {
+    level = halved(level, n);
+    append(level, n / 2);
+  }
 }
 
 }  // namespace wasp::sim

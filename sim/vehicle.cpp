@@ -33,7 +33,7 @@ void Vehicle::reset(const VehicleState& state, double rotor_radps) {
 void Vehicle::step(const std::array<double, 4>& wanted_radps) {
   for (std::size_t i = 0; i < 4; ++i) rotors_[i].step(wanted_radps[i], kPhysicsStep_s);
   Wrench wrench = rotor_wrench();
-  wrench.force_ned_N -= params_.drag_Npmps * state_.velocity_ned_mps;
+  wrench.force_ned_N -= params_.drag_Npmps * (state_.velocity_ned_mps - wind_ned_mps_);
   const ContactForce contact =
       contact_.at(state_.position_ned_m, state_.velocity_ned_mps, state_.q_ned_body, state_.rate_body_radps);
   state_.on_ground = contact.touching;

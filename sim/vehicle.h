@@ -28,6 +28,8 @@ class Vehicle {
   /// Stands on the floor z = 0 at the origin, heading north.
   explicit Vehicle(const VehicleParams& params);
 
+  /// Of the air, from now on; drag acts on the motion through it.
+  void set_wind(const Eigen::Vector3d& wind_ned_mps) { wind_ned_mps_ = wind_ned_mps; }
   /// One millisecond with these wanted rotor speeds [rad/s], front, right, back, left.
   void step(const std::array<double, 4>& wanted_radps);
 
@@ -50,6 +52,7 @@ class Vehicle {
   std::vector<Rotor> rotors_;
   GroundContact contact_;
   VehicleState state_;
+  Eigen::Vector3d wind_ned_mps_ = Eigen::Vector3d::Zero();
 };
 
 }  // namespace wasp::sim

@@ -1,6 +1,7 @@
-// The "wasp Kontron Kinect" quadrotor in numbers (thesis table A.4, appendix B): mass, inertia, rotors, legs.
-// Inertia is the sum of the rows of table B.2(a), whose printed totals are not their sums, plus a box for the Kinect.
-// Frames: body FRD. Rotors in plus configuration, numbered front 0, right 1, back 2, left 3 (thesis 1 ... 4).
+// The "wasp" quadrotors in numbers, the Kontron Kinect one by default (thesis table A.4, appendix B): mass, inertia,
+// rotors, legs. Inertia is the sum of the rows of table B.2(a), whose printed totals are not their sums, plus a box for
+// the Kinect. Frames: body FRD. Rotors in plus configuration, numbered front 0, right 1, back 2, left 3 (thesis 1 ...
+// 4).
 #pragma once
 
 #include <array>
@@ -14,7 +15,7 @@ struct InertiaRow {
   double xx = 0, yy = 0, zz = 0;
 };
 
-/// Table B.2(a), 'wasp' Kontron, row by row.
+/// Table B.2(a), 'wasp' Kontron, row by row. Table B.2(b), 'wasp' Gumstix, differs in the second row only.
 inline constexpr std::array<InertiaRow, 9> kKontronRows{{
     {2.93e-4, 2.93e-4, 6.00e-5},  // onboard electronics
     {4.36e-3, 4.36e-3, 6.67e-4},  // single board computer
@@ -27,6 +28,8 @@ inline constexpr std::array<InertiaRow, 9> kKontronRows{{
     {1.95e-3, 2.76e-5, 1.93e-3},
 }};
 
+inline constexpr InertiaRow kGumstixComputerRow{1.01e-3, 1.05e-3, 6.67e-4};
+
 /// B.2.2: a box of length l (x), width w (y), height h (z) [m] whose centre lies `below` [m] under the centre of mass.
 constexpr InertiaRow box_inertia(double mass_kg, double l, double w, double h, double below) {
   return {mass_kg * (w * w / 12 + h * h / 12 + below * below), mass_kg * (l * l / 12 + h * h / 12 + below * below),
@@ -37,12 +40,17 @@ constexpr InertiaRow box_inertia(double mass_kg, double l, double w, double h, d
 /// size of the Kinect's body, slung 8 cm below the centre of mass (our estimate; the thesis gives none).
 inline constexpr InertiaRow kKinectRow = box_inertia(1.925 - 1.230, 0.065, 0.28, 0.04, 0.08);
 
-/// Sum of all rows [kg m^2].
-constexpr InertiaRow total_inertia() {
-  InertiaRow sum = kKinectRow;
-  for (const auto& row : kKontronRows) sum = {sum.xx + row.xx, sum.yy + row.yy, sum.zz + row.zz};
+/// Sum of a payload's row and those of table B.2 [kg m^2].
+constexpr InertiaRow total_inertia(const InertiaRow& payload, const InertiaRow& computer) {
+  InertiaRow sum = payload;
+  for (std::size_t i = 0; i < kKontronRows.size(); ++i) {
+    const InertiaRow& row = i == 1 ? computer : kKontronRows[i];
+    sum = {sum.xx + row.xx, sum.yy + row.yy, sum.zz + row.zz};
+  }
   return sum;
 }
+/// The Kontron Kinect vehicle.
+constexpr InertiaRow total_inertia() { return total_inertia(kKinectRow, kKontronRows[1]); }
 
 /// Motor and propeller. Speed from voltage is (B.5); thrust b w^2, drag torque d w^2.
 ///
@@ -91,5 +99,27 @@ struct VehicleParams {
   /// Share of full collective that carries the weight, 0 ... 1.
   [[nodiscard]] double hover_thrust() const { return mass_kg * gravity_mps2 / max_collective_N(); }
 };
+
+/// One column of table A.4: weight and where the camera looks.
+struct VehiclePreset {
+  const char* name;
+  double mass_kg;
+  InertiaRow inertia_kgm2;
+  double camera_pitch_down_deg, camera_forward_m, camera_below_m;
+
+  [[nodiscard]] VehicleParams params() const {
+    VehicleParams p;
+    p.mass_kg = mass_kg;
+    p.inertia_kgm2 = inertia_kgm2;
+    return p;
+  }
+};
+
+/// The first is the default.
+inline constexpr std::array<VehiclePreset, 3> kVehiclePresets{{
+    {"kontron_kinect", 1.925, total_inertia(), 30, 0.05, 0},
+    {"kontron", 1.230, total_inertia({}, kKontronRows[1]), 0, 0.05, 0},
+    {"gumstix", 0.700, total_inertia({}, kGumstixComputerRow), 90, 0, 0.05},
+}};
 
 }  // namespace wasp::sim

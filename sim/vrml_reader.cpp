@@ -1,5 +1,5 @@
 // Coin parses and hands out triangles with their material, texture coordinates and place; two that make a planar quad
-// of one surface become one again.
+// of one surface become one again. What moves (sim/vrml_motion.h) is gathered apart and put behind the rest.
 #include <Inventor/SbMatrix.h>
 #include <Inventor/SoDB.h>
 #include <Inventor/SoInput.h>
@@ -10,6 +10,7 @@
 #include <Inventor/VRMLnodes/SoVRMLImageTexture.h>
 #include <Inventor/VRMLnodes/SoVRMLPixelTexture.h>
 #include <Inventor/VRMLnodes/SoVRMLShape.h>
+#include <Inventor/VRMLnodes/SoVRMLTransform.h>
 #include <Inventor/VRMLnodes/SoVRMLViewpoint.h>
 #include <Inventor/VRMLnodes/SoVRMLWorldInfo.h>
 #include <Inventor/actions/SoCallbackAction.h>
@@ -28,6 +29,7 @@
 #include "sim/lab_textures.h"
 #include "sim/vrml_exposure.h"
 #include "sim/vrml_file.h"
+#include "sim/vrml_motion.h"
 
 namespace wasp::sim {
 namespace {
@@ -70,7 +72,8 @@ drivers::Image<std::uint8_t> grey_of(const SoSFImage& field) {
 
 class Builder {
  public:
-  Builder(fs::path file, bool baked) : file_(std::move(file)), baked_(baked) {
+  Builder(fs::path file, bool baked, const VrmlMotions& motions)
+      : file_(std::move(file)), baked_(baked), motions_(motions) {
     world_.textures.push_back(Texture(1, [](int, int) { return 1.0; }));
     world_.textures.push_back(paint_detail());
   }
@@ -83,6 +86,14 @@ class Builder {
     static_cast<Builder*>(self)->texture_ = 0;
     return SoCallbackAction::CONTINUE;
   }
+  static SoCallbackAction::Response before_transform(void* self, SoCallbackAction* action, const SoNode* node) {
+    static_cast<Builder*>(self)->enter(*static_cast<const SoVRMLTransform*>(node), action->getModelMatrix());
+    return SoCallbackAction::CONTINUE;
+  }
+  static SoCallbackAction::Response after_transform(void* self, SoCallbackAction*, const SoNode* node) {
+    static_cast<Builder*>(self)->leave(*static_cast<const SoVRMLTransform*>(node));
+    return SoCallbackAction::CONTINUE;
+  }
   static void on_triangle(void* self, SoCallbackAction* action, const SoPrimitiveVertex* a, const SoPrimitiveVertex* b,
                           const SoPrimitiveVertex* c) {
     static_cast<Builder*>(self)->triangle(*action, {a, b, c});
@@ -91,6 +102,7 @@ class Builder {
   /// Coin is no place to throw through: the first problem waits until the traversal is over.
   World take() {
     if (!problem_.empty()) throw std::runtime_error(file_.string() + ": " + problem_);
+    for (const Part& part : parts_) append_part(part);
     if (world_.quads.empty()) throw std::runtime_error(file_.string() + ": no geometry");
     return std::move(world_);
   }
@@ -100,6 +112,59 @@ class Builder {
     Vec3 p;
     float u, v;
   };
+  /// A moving part: its faces, less the parent's place, and where it goes.
+  struct Part {
+    const SoVRMLTransform* node = nullptr;  ///< for comparison only
+    std::string name;
+    std::vector<MoverKey> keys;
+    bool looped = false;
+    Vec3 origin = Vec3::Zero();
+    World faces;
+  };
+
+  void enter(const SoVRMLTransform& node, const SbMatrix& parent) {
+    const auto motion = motions_.find(&node);
+    if (motion == motions_.end() || !problem_.empty()) return;
+    if (moving_) {
+      problem_ = "a moving Transform within another";
+      return;
+    }
+    SbVec3f origin;
+    parent.multVecMatrix(SbVec3f(0, 0, 0), origin);
+    try {
+      parts_.push_back({&node,
+                        node.getName().getString(),
+                        keys_in_world(motion->second, parent),
+                        motion->second.looped,
+                        ned_of(origin),
+                        {}});
+      moving_ = true;
+    } catch (const std::exception& e) {
+      problem_ = e.what();
+    }
+    for (const MoverKey& key : moving_ ? parts_.back().keys : std::vector<MoverKey>{})
+      if (!near_enough(key.place.position_ned_m)) problem_ = "a place on a path is not finite or beyond 1e5 m";
+  }
+  void leave(const SoVRMLTransform& node) {
+    if (moving_ && parts_.back().node == &node) moving_ = false;
+  }
+  static bool near_enough(const Vec3& p) { return p.allFinite() && p.cwiseAbs().maxCoeff() <= kFarthest_m; }
+  /// Where faces go just now.
+  World& faces() { return moving_ ? parts_.back().faces : world_; }
+
+  void append_part(const Part& part) {
+    if (part.faces.quads.empty()) return;
+    world_.begin_mover(!part.name.empty() ? part.name : "part_" + std::to_string(world_.movers.size()), part.keys,
+                       part.looped);
+    const auto first = static_cast<std::uint32_t>(world_.vertices_ned_m.size());
+    for (const Vec3& v : part.faces.vertices_ned_m) world_.vertices_ned_m.push_back(v);
+    for (auto quad : part.faces.quads) {
+      for (auto& v : quad) v += first;
+      world_.quads.push_back(quad);
+    }
+    for (const Surface& s : part.faces.surfaces) world_.surfaces.push_back(s);
+    world_.end_mover();
+  }
 
   void appearance(const SoVRMLAppearance& a) {
     texture_ = 0;
@@ -137,8 +202,8 @@ class Builder {
       action.getModelMatrix().multVecMatrix(corners[i]->getPoint(), place);
       SbVec4f at;
       action.getTextureMatrix().multVecMatrix(corners[i]->getTextureCoords(), at);
-      t[i] = {ned_of(place), at[0], 1.f - at[1]};
-      if (!t[i].p.allFinite() || t[i].p.cwiseAbs().maxCoeff() > kFarthest_m || !std::isfinite(t[i].u + t[i].v)) {
+      t[i] = {moving_ ? Vec3(ned_of(place) - parts_.back().origin) : ned_of(place), at[0], 1.f - at[1]};
+      if (!near_enough(t[i].p) || !std::isfinite(t[i].u + t[i].v)) {
         problem_ = "a coordinate is not finite or beyond 1e5 m";
         return;
       }
@@ -181,11 +246,12 @@ class Builder {
 
   /// True if the triangle and the one before it are the halves of a planar quad of one surface: 0 1 2 and 0 2 3.
   bool joins_last(const std::array<Corner, 3>& t, const Surface& s) {
-    if (world_.quads.empty()) return false;
-    auto& quad = world_.quads.back();
-    const Surface& last = world_.surfaces.back();
+    World& world = faces();
+    if (world.quads.empty()) return false;
+    auto& quad = world.quads.back();
+    const Surface& last = world.surfaces.back();
     const auto same = [](const Vec3& a, const Vec3& b) { return (a - b).norm() < 1e-5f * (1.f + a.norm()); };
-    const auto& v = world_.vertices_ned_m;
+    const auto& v = world.vertices_ned_m;
     if (quad[2] != quad[3] || !same(v[quad[0]], t[0].p) || !same(v[quad[2]], t[1].p)) return false;
     for (const Corner& c : t)
       if (std::abs(last.u_axis.dot(c.p) + last.u0 - c.u) > 2e-3f ||
@@ -194,21 +260,25 @@ class Builder {
     if (last.texture != s.texture || std::abs(last.brightness - s.brightness) > 1e-5f || last.glow != s.glow ||
         !(last.normal.dot(s.normal) > 0.99999f))
       return false;
-    world_.vertices_ned_m.push_back(t[2].p);
-    quad[3] = static_cast<std::uint32_t>(world_.vertices_ned_m.size() - 1);
+    world.vertices_ned_m.push_back(t[2].p);
+    quad[3] = static_cast<std::uint32_t>(world.vertices_ned_m.size() - 1);
     return true;
   }
 
   void append(const std::array<Corner, 3>& t, const Surface& s) {
-    const auto first = static_cast<std::uint32_t>(world_.vertices_ned_m.size());
-    for (const Corner& corner : t) world_.vertices_ned_m.push_back(corner.p);
-    world_.quads.push_back({first, first + 1, first + 2, first + 2});
-    world_.surfaces.push_back(s);
+    World& world = faces();
+    const auto first = static_cast<std::uint32_t>(world.vertices_ned_m.size());
+    for (const Corner& corner : t) world.vertices_ned_m.push_back(corner.p);
+    world.quads.push_back({first, first + 1, first + 2, first + 2});
+    world.surfaces.push_back(s);
   }
 
   fs::path file_;
   bool baked_;
+  const VrmlMotions& motions_;
   World world_;
+  std::vector<Part> parts_;
+  bool moving_ = false;  ///< inside the last of parts_
   std::string problem_;
   std::map<std::string, std::int32_t> by_url_;
   std::int32_t texture_ = 0;
@@ -247,6 +317,7 @@ void read_head(SoVRMLGroup& root, Scene& scene, bool& baked) {
   if (const auto* info = first_of<SoVRMLWorldInfo>(root)) {
     scene.title = info->title.getValue().getString();
     baked = info->info.getNum() > 0 && info->info[0] == kVrmlBakedLight;
+    scene.world.smooth = baked && info->info.getNum() > 1 && info->info[1] == kVrmlSmooth;
   }
   if (const auto* background = first_of<SoVRMLBackground>(root); background && background->skyColor.getNum() > 0) {
     const SbColor& sky = background->skyColor[0];
@@ -258,6 +329,15 @@ void read_head(SoVRMLGroup& root, Scene& scene, bool& baked) {
     view->orientation.getValue().multVec(SbVec3f(0, 0, -1), ahead);
     const Vec3 heading = ned_of(ahead);
     scene.start_yaw_rad = std::atan2(heading.y(), heading.x());
+  }
+}
+
+VrmlMotions motions_of(SoVRMLGroup& root, const fs::path& file) {
+  try {
+    return take_motions(root);
+  } catch (const std::exception& e) {
+    root.unref();
+    throw std::runtime_error(file.string() + ": " + e.what());
   }
 }
 
@@ -274,16 +354,21 @@ Scene read_vrml(const fs::path& file) {
   Scene scene;
   bool baked = false;
   read_head(*root, scene, baked);
-  Builder builder(file, baked);
+  const VrmlMotions motions = motions_of(*root, file);
+  Builder builder(file, baked, motions);
   SoCallbackAction action;
   action.addPreCallback(SoVRMLAppearance::getClassTypeId(), &Builder::on_appearance, &builder);
   action.addPostCallback(SoVRMLShape::getClassTypeId(), &Builder::after_shape, &builder);
+  action.addPreCallback(SoVRMLTransform::getClassTypeId(), &Builder::before_transform, &builder);
+  action.addPostCallback(SoVRMLTransform::getClassTypeId(), &Builder::after_transform, &builder);
   action.addTriangleCallback(SoShape::getClassTypeId(), &Builder::on_triangle, &builder);
   action.apply(root);
   root->unref();
   const float sky = scene.world.sky;
+  const bool smooth = scene.world.smooth;
   scene.world = builder.take();
   scene.world.sky = sky;
+  if (smooth) scene.world.make_smooth();
   return scene;
 }
 

@@ -48,4 +48,41 @@ void World::add_box(const Vec3& base, const Vec3& size_m, float yaw_rad, const M
   add_quad(near_left + y + z, -z, x, m);  // right
 }
 
+void World::make_smooth() {
+  smooth = true;
+  textures[1] = Texture(1, [](int, int) { return 0.5; });
+}
+
+void World::begin_mover(const std::string& name, std::vector<MoverKey> keys, bool looped) {
+  movers.push_back({name, static_cast<std::uint32_t>(quads.size()), 0, std::move(keys), looped});
+}
+
+void World::end_mover() {
+  movers.back().quad_count = static_cast<std::uint32_t>(quads.size()) - movers.back().first_quad;
+}
+
+Surface World::placed(const Surface& own, const MoverPlace& place) {
+  const Mat3 R = R_world_mover(place);
+  Surface s = own;
+  s.u_axis = R * own.u_axis, s.v_axis = R * own.v_axis, s.normal = R * own.normal;
+  s.u0 = own.u0 - s.u_axis.dot(place.position_ned_m), s.v0 = own.v0 - s.v_axis.dot(place.position_ned_m);
+  return s;
+}
+
+World World::at(double t_s) const {
+  World still = *this;
+  still.movers.clear();
+  for (const Mover& mover : movers) {
+    const MoverPlace place = mover.at(t_s);
+    const Mat3 R = R_world_mover(place);
+    std::vector<bool> moved(vertices_ned_m.size());
+    for (std::uint32_t quad = mover.first_quad; quad < mover.first_quad + mover.quad_count; ++quad) {
+      still.surfaces[quad] = placed(surfaces[quad], place);
+      for (const std::uint32_t v : quads[quad])
+        if (!moved[v]) still.vertices_ned_m[v] = place.position_ned_m + R * vertices_ned_m[v], moved[v] = true;
+    }
+  }
+  return still;
+}
+
 }  // namespace wasp::sim

@@ -21,6 +21,7 @@ struct View {
   double yaw_deg = 0, pitch_down_deg = 0;
   int width_px = 640, height_px = 480;
   double field_of_view_deg = 75;
+  double at_s = 0;  ///< after the vehicle first left the ground
 };
 
 /// Grey picture seen from the start (heading 0) or wherever `view` says.
@@ -34,6 +35,7 @@ drivers::Image<std::uint8_t> draw(const Scene& scene, const View& view) {
       Eigen::AngleAxisf(static_cast<float>(to_radians(Degrees{view.yaw_deg}).value), Vec3::UnitZ()).toRotationMatrix();
   const CameraPose pose{Vec3(view.eye[0], view.eye[1], -view.eye[2]),
                         R_yaw * R_body_cam_from_pitch_down(to_radians(Degrees{view.pitch_down_deg}))};
+  const WorldScene::Moment moment = renderer.scene().at(view.at_s);
   drivers::Image<std::uint8_t> image{view.width_px, view.height_px, {}};
   std::vector<float> luminance(static_cast<std::size_t>(view.width_px) * Renderer::kBandRows), depth(luminance.size());
   for (int row = 0; row < view.height_px; row += Renderer::kBandRows) {
@@ -85,6 +87,9 @@ int main(int argc, char** argv) {
   show->add_option("--pitch-down-deg", view.pitch_down_deg, "90: straight down")->capture_default_str();
   show->add_option("--fov-deg", view.field_of_view_deg, "across the picture")
       ->check(CLI::Range(10.0, 140.0))
+      ->capture_default_str();
+  show->add_option("--at-s", view.at_s, "moving parts as they are this long after the vehicle first left the ground")
+      ->check(CLI::Range(0.0, 1e6))
       ->capture_default_str();
   CLI11_PARSE(app, argc, argv);
   try {

@@ -4,6 +4,8 @@
 #include <ctime>
 #include <iostream>
 
+#include "tools/mission_files.h"
+
 namespace wasp::tools {
 namespace {
 
@@ -20,6 +22,16 @@ bool plain(const std::string& name) {
              std::string::npos;
 }
 
+/// Empty, or what is wrong with the name.
+std::string known_mission(const std::string& name) {
+  try {
+    mission_folder(name);
+    return {};
+  } catch (const std::exception& e) {
+    return e.what();
+  }
+}
+
 }  // namespace
 
 std::optional<int> parse_fly_options(int argc, char** argv, FlyOptions& o) {
@@ -31,9 +43,9 @@ std::optional<int> parse_fly_options(int argc, char** argv, FlyOptions& o) {
       "ever commanded; 2: bad arguments; 1: anything else."};
   app.name("wasp fly");
   app.option_defaults()->always_capture_default();
-  app.add_option("--mission", o.mission, "take off, hold each configured height, land")
-      ->check(CLI::IsMember({"hover"}));
-  app.add_option("--seconds", o.seconds, "total time in flight, shared among the heights (0: as configured, 80 s)")
+  app.add_option("--mission", o.mission, "what to fly (config/missions): " + mission_list())->check(known_mission);
+  app.add_option("--seconds", o.seconds,
+                 "total time in flight, shared among the legs of the mission (0: as configured; hover: 80 s)")
       ->check(CLI::Range(0.0, 86400.0));
   app.add_option("--replay", o.replay,
                  "fly on this recording, looped if --seconds asks for more; 'example' makes and flies one");
@@ -41,7 +53,8 @@ std::optional<int> parse_fly_options(int argc, char** argv, FlyOptions& o) {
   app.add_option("--config", o.config, "TOML file whose keys override the defaults")->check(CLI::ExistingFile);
   app.add_option("--name", o.name, "name of the run and its folder (default: mission and time)");
   app.add_option("--out", o.out, "parent folder");
-  app.add_option("--world", o.world, "VRML97 file to fly in (`wasp world make` makes one); default: the laboratory")
+  app.add_option("--world", o.world,
+                 "VRML97 file to fly in (`wasp world make` makes one); default: that of the mission")
       ->check(CLI::ExistingFile)
       ->excludes("--replay");
   app.add_option("--seed", o.seed, "seed of the simulated world and noise");

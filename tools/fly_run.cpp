@@ -1,17 +1,21 @@
 #include "tools/fly_run.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <fstream>
 #include <iostream>
+#include <numeric>
 
-#include "control/mission.h"
 #include "drivers/recording.h"
 #include "rt/clock.h"
 #include "scheduling/config.h"
 #include "scheduling/replay_camera.h"
+#include "sim/sim_config.h"
+#include "tools/camera_section.h"
 #include "tools/child_process.h"
+#include "tools/mission_files.h"
 #include "tools/program_paths.h"
 
 namespace wasp::tools {
@@ -26,42 +30,52 @@ void write_text(const fs::path& path, const std::string& text) {
 
 namespace {
 
-/// Behaviour sections are read by the flight process; here only [mission] matters.
-std::vector<control::HoverLeg> configured_legs(const FlyOptions& o) {
-  std::vector<control::HoverLeg> legs;
-  std::vector<double> heights{0.5, 1.0}, seconds{40, 40};
-  std::vector<std::string> files{(config_folder() / "wasp.toml").string()};
-  if (!o.config.empty()) files.push_back(o.config);
-  for (const auto& f : files) {
-    auto mission = scheduling::TomlTable::parse_file(f).table("mission");
-    mission.numbers("heights_m", heights, 0.3, 4.0);
-    mission.numbers("seconds", seconds, 1, 36'000);
+struct Legs {
+  std::vector<double> heights_m, seconds;
+};
+
+/// The flight process' configuration before what this run decides: defaults, mission, user.
+std::vector<std::string> configuration_files(const Run& run) {
+  std::vector<std::string> files{(config_folder() / "wasp.toml").string(), (run.mission / "flight.toml").string()};
+  if (!run.options.config.empty()) files.push_back(run.options.config);
+  return files;
+}
+
+/// The legs as configured, scaled to --seconds. Everything else of a leg is read by the flight process alone.
+Legs planned_legs(const Run& run) {
+  Legs legs;
+  for (const auto& file : configuration_files(run)) {
+    auto mission = scheduling::TomlTable::parse_file(file).table("mission");
+    mission.numbers("heights_m", legs.heights_m, 0.3, 20.0);
+    mission.numbers("seconds", legs.seconds, 1, 36'000);
   }
-  if (heights.size() != seconds.size() || heights.empty())
+  if (legs.heights_m.size() != legs.seconds.size() || legs.heights_m.empty())
     throw scheduling::ConfigError("mission.heights_m and mission.seconds must have the same length");
-  double total = 0;
-  for (const double s : seconds) total += s;
-  const double scale = o.seconds > 0 ? o.seconds / total : 1.0;
-  for (std::size_t i = 0; i < heights.size(); ++i)
-    legs.push_back({static_cast<float>(heights[i]), static_cast<float>(std::max(1.0, seconds[i] * scale))});
+  const double total = std::accumulate(legs.seconds.begin(), legs.seconds.end(), 0.0);
+  if (run.options.seconds > 0)
+    for (double& s : legs.seconds) s = std::max(1.0, s * run.options.seconds / total);
   return legs;
 }
 
-/// The part of the configuration that this run decides: endpoint, camera, mission.
-void write_override(Run& run) {
+/// What the simulator shows, told to the flight process: cameras are said once, in the mission's sim.toml.
+std::string camera_sections(const sim::SimConfig& sim) {
+  return fmt::format("[camera]\nrate_hz = {}\n{}", sim.camera_rate_hz, camera_keys(sim.camera)) +
+         fmt::format("[camera_down]\nenabled = {}\nrate_hz = {}\n{}", sim.down.enabled, sim.down.rate_hz,
+                     camera_keys(sim.down.setup.geometry));
+}
+
+/// The part of the configuration that this run decides: endpoint, cameras, length of the legs.
+void write_override(Run& run, const sim::SimConfig& sim) {
   std::string text = "# written by wasp fly for this run\n[run]\n";
   text += fmt::format("enforce_real_time = {}\nstrict_syscalls = {}\n", run.real_time, run.options.strict_syscalls);
   text += fmt::format("incident_dir = \"{}\"\n", fs::absolute(run.folder / "incidents").string());
   text += fmt::format("[autopilot]\nendpoint = \"serial:{}:921600\"\n", fs::absolute(run.folder / "tty").string());
   if (run.options.replay.empty()) {
-    std::string heights, seconds;
-    run.flight_seconds = 0;
-    for (const auto& leg : configured_legs(run.options)) {
-      heights += fmt::format("{}{}", heights.empty() ? "" : ", ", leg.height_m);
-      seconds += fmt::format("{}{:.3f}", seconds.empty() ? "" : ", ", leg.seconds);
-      run.flight_seconds += static_cast<double>(leg.seconds);
-    }
-    text += fmt::format("[mission]\nheights_m = [{}]\nseconds = [{}]\n", heights, seconds);
+    const Legs legs = planned_legs(run);
+    run.flight_seconds = std::accumulate(legs.seconds.begin(), legs.seconds.end(), 0.0);
+    text += fmt::format("[mission]\nheights_m = [{}]\nseconds = [{:.3f}]\n", fmt::join(legs.heights_m, ", "),
+                        fmt::join(legs.seconds, ", "));
+    text += camera_sections(sim);
   } else {
     text += "[camera]\ndriver = \"replay\"\n";
   }
@@ -92,17 +106,6 @@ void plan_replay(Run& run) {
       to_seconds(scheduling::ReplayCamera::lap_ns(recording)), recording.layout(), run.flight_seconds);
 }
 
-void write_camera_toml(const Run& run) {
-  scheduling::Config c;
-  write_text(
-      run.folder / "camera.toml",
-      fmt::format("width_px = {}\nheight_px = {}\nfx_px = {}\nfy_px = {}\ncx_px = {}\ncy_px = {}\npitch_down_deg = {}\n"
-                  "depth_units_per_m = 1000\nposition_body_m = [0.05, 0.0, 0.0]\n",
-                  c.camera.intrinsics.width_px, c.camera.intrinsics.height_px, c.camera.intrinsics.fx_px,
-                  c.camera.intrinsics.fy_px, c.camera.intrinsics.cx_px, c.camera.intrinsics.cy_px,
-                  c.camera_pitch_down_deg));
-}
-
 }  // namespace
 
 Run plan_run(FlyOptions options) {
@@ -111,6 +114,7 @@ Run plan_run(FlyOptions options) {
   if (options.replay == "example") options.replay = example_recording(options);
   run.options = std::move(options);
   run.folder = run.options.out / run.options.name;
+  run.mission = mission_folder(run.options.mission);
   run.instance = run.options.name;
   if (fs::exists(run.folder / "run.json") || fs::exists(run.folder / "log/imu.csv"))
     throw std::runtime_error(run.folder.string() +
@@ -121,8 +125,9 @@ Run plan_run(FlyOptions options) {
 }
 
 void write_configuration(Run& run) {
-  write_override(run);
-  write_camera_toml(run);
+  const auto sim = sim::load_sim_config((run.mission / "sim.toml").string());
+  write_override(run, sim);
+  write_text(run.folder / "camera.toml", camera_keys(sim.camera) + "depth_units_per_m = 1000\n");
 }
 
 /// Asks the flight binary itself, for the rights may have been granted to it alone.
@@ -146,9 +151,8 @@ void check_rights(Run& run) {
 }
 
 std::vector<std::string> flight_arguments(const Run& run) {
-  std::vector<std::string> a{program("wasp"), "flight",   "--instance",
-                             run.instance,    "--config", (config_folder() / "wasp.toml").string()};
-  if (!run.options.config.empty()) a.insert(a.end(), {"--config", run.options.config});
+  std::vector<std::string> a{program("wasp"), "flight", "--instance", run.instance};
+  for (const auto& file : configuration_files(run)) a.insert(a.end(), {"--config", file});
   a.insert(a.end(), {"--config", (run.folder / "override.toml").string()});
   if (!run.real_time) a.push_back("--no-rt");
   if (!run.options.replay.empty())
@@ -162,6 +166,8 @@ std::vector<std::string> sim_arguments(const Run& run) {
                              run.instance,
                              "--tty-link",
                              (run.folder / "tty").string(),
+                             "--config",
+                             (run.mission / "sim.toml").string(),
                              "--seed",
                              std::to_string(run.options.seed)};
   if (!run.options.world.empty()) a.insert(a.end(), {"--world", run.options.world});

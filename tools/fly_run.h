@@ -13,6 +13,7 @@ namespace wasp::tools {
 struct Run {
   FlyOptions options;
   std::filesystem::path folder;
+  std::filesystem::path mission;  ///< folder with its sim.toml and flight.toml
   std::string instance;
   bool real_time = false;
   std::string note;  ///< why it is not real time
@@ -28,7 +29,8 @@ Run plan_run(FlyOptions options);
 /// real time is demanded.
 void check_rights(Run& run);
 
-/// Writes override.toml (endpoint, camera, mission: what this run decides) and camera.toml (for the recording).
+/// Writes override.toml (endpoint, the simulator's cameras, length of the legs: what this run decides) and camera.toml
+/// (for the recording).
 void write_configuration(Run& run);
 
 std::vector<std::string> flight_arguments(const Run& run);

@@ -52,6 +52,13 @@ nlohmann::json run_document(const Run& run, const std::vector<Phase>& phases, co
   return doc;
 }
 
+/// What this mission must show beyond being flown to its end.
+std::vector<Result> mission_results(const Run& run, const std::vector<Phase>& phases) {
+  if (!run.options.replay.empty()) return {};
+  if (run.options.mission == "hover") return hover_results(run.folder / "log", phases);
+  return {};
+}
+
 std::vector<Result> judge(const Run& run, int flight_code, const std::vector<Phase>& phases,
                           const RunSummary& summary) {
   std::vector<Result> results;
@@ -62,8 +69,7 @@ std::vector<Result> judge(const Run& run, int flight_code, const std::vector<Pha
                      ended_short || summary.mission_result == 1});
   results.push_back(
       {"control ticks commanded by behaviours", static_cast<double>(summary.behaviour_ticks), "", "", true});
-  if (run.options.replay.empty())
-    for (auto& r : hover_results(run.folder / "log", phases)) results.push_back(std::move(r));
+  for (auto& r : mission_results(run, phases)) results.push_back(std::move(r));
   for (auto& r : timing_results(summary, allowed_share(run))) results.push_back(std::move(r));
   return results;
 }

@@ -1,8 +1,10 @@
 #include "tools/record_session.h"
 
+#include <algorithm>
 #include <array>
 #include <exception>
 #include <stdexcept>
+#include <string_view>
 
 #include "rt/clock.h"
 #include "shm/topics.h"
@@ -114,11 +116,12 @@ void RecordSession::follow(Source& source, TopicCount& count, Start start) {
     note(region.name(), "topic '" + count.topic + "' of unknown type '" + count.type + "' is not recorded");
 }
 
-/// Frames when asked for, of the front camera: what a replay can show. Flow fields never: a replay makes them anew, to
-/// the bit, from the frames. record.json says so of each topic.
+/// Every table; frames when asked for, of the front camera: what a replay can show. Flow fields never: a replay makes
+/// them anew, to the bit, from the frames. record.json says so of each topic.
 bool RecordSession::keeps(const TopicCount& count) const {
-  if (count.type == "Flow") return false;
-  return count.type != "Frame" || (options_.frames && (count.topic == shm::kGray || count.topic == shm::kDepth));
+  if (count.type == "Frame") return options_.frames && (count.topic == shm::kGray || count.topic == shm::kDepth);
+  constexpr std::array<std::string_view, 5> kTableTypes{"Imu", "Attitude", "Command", "Truth", "Cue"};
+  return std::ranges::find(kTableTypes, count.type) != kTableTypes.end();
 }
 
 void RecordSession::follow_frames(Source& source, TopicCount& count, Start start) {

@@ -27,15 +27,43 @@ float smooth(const EdgeAltitude::Params& p, TimeNs now_ns, float height_m, EdgeA
   return state.filtered_height_m;
 }
 
-void fill_detail(const EdgeHeight& e, const EdgeRows& rows, CueBody& cue) noexcept {
+/// Lambda in use.
+EdgeDensity density_in_use(const EdgeAltitude::Params& p, const EdgeAltitude::State& state) noexcept {
+  const bool estimated = p.estimate_lambda != 0 && state.density.density.accepted > 0;
+  return estimated ? state.density.density : EdgeDensity{p.height.edges_per_m, 0.f, 0};
+}
+
+/// Specific force to upward acceleration: -(R_ned_body f)_z - g. NaN without attitude, which no estimate uses.
+double up_acceleration_mps2(const BehaviourInput& input, bool attitude) noexcept {
+  constexpr float kGravity_mps2 = 9.80665f;
+  const auto& q = input.attitude.q_ned_body;
+  const auto& f = input.accel_body_mps2;
+  if (!attitude || !input.accel_valid) return NAN;
+  const Vec3 force_ned = Quat(q[0], q[1], q[2], q[3]).normalized() * Vec3(f[0], f[1], f[2]);
+  return static_cast<double>(-force_ned.z() - kGravity_mps2);
+}
+
+/// Refines lambda; the filtered height goes along, so that a new lambda makes no ramp.
+void learn(const EdgeAltitude::Params& p, const BehaviourInput& input, const EdgeHeight& e, bool attitude,
+           EdgeAltitude::State& state) noexcept {
+  if (p.estimate_lambda == 0) return;
+  const float before = density_in_use(p, state).edges_per_m;
+  const double up_mps2 = up_acceleration_mps2(input, attitude);
+  const double mu = e.valid && e.misfit <= p.max_misfit ? static_cast<double>(e.edges_per_height) : 0.0;
+  observe_edge_density(p.density, input.exposed_at_ns, mu, std::isfinite(up_mps2), up_mps2, p.height.edges_per_m,
+                       state.density);
+  state.filtered_height_m *= before / density_in_use(p, state).edges_per_m;
+}
+
+void fill_detail(const EdgeHeight& e, const EdgeRows& rows, const EdgeDensity& density, CueBody& cue) noexcept {
   using D = EdgeAltitude::Detail;
   cue.detail[D::kModeHeight_m] = e.mode_height_m;
   cue.detail[D::kEdgesPerHeight] = e.edges_per_height;
   cue.detail[D::kMisfit] = e.misfit;
   cue.detail[D::kEdgeShare] = e.edge_share;
   cue.detail[D::kThreshold] = static_cast<float>(rows.threshold);
-  cue.detail[D::kFirstRow_px] = static_cast<float>(e.first_row_px);
-  cue.detail[D::kModel] = static_cast<float>(e.model);
+  cue.detail[D::kEdgesPerM] = density.edges_per_m;
+  cue.detail[D::kEdgesPerMSigma] = density.sigma;
   cue.detail[D::kRawHeight_m] = e.height_m;
 }
 
@@ -53,14 +81,22 @@ CueBody EdgeAltitude::step(const Params& params, const BehaviourInput& input, St
   rows_params.kind = suitable_kind(suitable_model(params.height, k, up_cam));
   EdgeRows rows;
   count_edge_rows(rows_params, input.gray, {}, rows);
-  const EdgeHeight e = estimate_edge_height(params.height, k, up_cam, rows);
+  EdgeHeightParams height = params.height;
+  height.edges_per_m = density_in_use(params, state).edges_per_m;
+  EdgeHeight e = estimate_edge_height(height, k, up_cam, rows);
+  learn(params, input, e, attitude, state);
   if (!e.valid || !(e.misfit <= params.max_misfit)) return cue;
+  const EdgeDensity density = density_in_use(params, state);
+  const float rescale = height.edges_per_m / density.edges_per_m;
+  e.height_m *= rescale;
+  e.mode_height_m *= rescale;
+  e.height_sigma_m = std::hypot(rescale * e.height_sigma_m, e.height_m * density.sigma / density.edges_per_m);
   cue.validity = Validity::kValid;
   cue.has_height = 1;
   cue.height_m = smooth(params, input.exposed_at_ns, e.height_m, state);
   cue.height_sigma_m = std::hypot(e.height_sigma_m, attitude ? 0.f : kNoAttitudeSpread * e.height_m);
   cue.quality = e.model == EdgeModel::kCount ? 0.5f : std::clamp(1.f - e.misfit / params.max_misfit, 0.f, 1.f);
-  fill_detail(e, rows, cue);
+  fill_detail(e, rows, density, cue);
   return cue;
 }
 

@@ -5,6 +5,8 @@
 #include <cmath>
 
 #include "sim/lockstep.h"
+#include "vision/edge_altitude.h"
+#include "vision/ground_altitude.h"
 
 namespace wasp::sim {
 namespace {
@@ -22,6 +24,10 @@ LockstepOptions options(std::uint32_t seed, float seconds) {
   LockstepOptions o;
   o.sim.seed = seed;
   o.control = hover(seconds);
+  vision::GroundAltitude::Params ground;
+  vision::EdgeAltitude::Params edge;
+  ground.camera = edge.camera = o.sim.camera;
+  o.behaviours = {lockstep_behaviour<vision::GroundAltitude>(0, ground), lockstep_behaviour<vision::EdgeAltitude>(1, edge)};
   return o;
 }
 
@@ -50,7 +56,7 @@ Errors errors_of(const std::vector<LockstepSample>& samples, int leg, double set
 class LockstepHover : public ::testing::TestWithParam<std::uint32_t> {};
 
 TEST_P(LockstepHover, HoldsBothHeightsWithinTheBar) {
-  const auto samples = Lockstep(options(GetParam(), 12.f)).fly(60);
+  const auto samples = Lockstep(options(GetParam(), 12.f)).fly(60).samples;
   ASSERT_FALSE(samples.empty());
   EXPECT_EQ(static_cast<control::MissionPhase>(samples.back().command.mission_phase), control::MissionPhase::kDone);
   for (const auto& [leg, setpoint_m] : {std::pair{0, 0.5}, std::pair{1, 1.0}}) {
@@ -66,11 +72,14 @@ INSTANTIATE_TEST_SUITE_P(Seeds, LockstepHover, ::testing::Values(1u, 77u, 2026u)
 
 TEST(Lockstep, SameSeedSameFlightToTheBit) {
   const auto a = Lockstep(options(5, 2.f)).fly(10), b = Lockstep(options(5, 2.f)).fly(10);
-  ASSERT_EQ(a.size(), b.size());
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    ASSERT_EQ(a[i].truth.position_ned_m, b[i].truth.position_ned_m) << i;
-    ASSERT_EQ(a[i].command.thrust, b[i].command.thrust) << i;
-    ASSERT_EQ(a[i].ground.height_m, b[i].ground.height_m) << i;
+  ASSERT_EQ(a.samples.size(), b.samples.size());
+  for (std::size_t i = 0; i < a.samples.size(); ++i) {
+    ASSERT_EQ(a.samples[i].truth.position_ned_m, b.samples[i].truth.position_ned_m) << i;
+    ASSERT_EQ(a.samples[i].command.thrust, b.samples[i].command.thrust) << i;
+  }
+  ASSERT_EQ(a.cues.size(), b.cues.size());
+  for (std::size_t i = 0; i < a.cues.size(); ++i) {
+    ASSERT_EQ(a.cues[i].body.height_m, b.cues[i].body.height_m) << i;
   }
 }
 
@@ -78,7 +87,7 @@ TEST(Lockstep, BlindItHoldsThenDescends) {
   LockstepOptions o = options(3, 5.f);
   o.sim.sensor.max_range_m = 0.41f;  // the sensor sees nothing from the air
   o.control.mission.patience_s = 5;
-  const auto samples = Lockstep(o).fly(10);
+  const auto samples = Lockstep(o).fly(10).samples;
   ASSERT_FALSE(samples.empty());
   EXPECT_EQ(static_cast<control::MissionPhase>(samples.back().command.mission_phase), control::MissionPhase::kBroken);
   for (const auto& s : samples) EXPECT_EQ(s.command.thrust, 0.f);  // it never left the ground

@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "sim/lab_world.h"
+#include "tests/sim/optics_scenes.h"
 #include "types/units.h"
 
 namespace wasp::sim {
@@ -121,6 +122,15 @@ TEST(Renderer, UndistortsItsRays) {
   EXPECT_EQ(a.depth_m[240 * 640 + 320], b.depth_m[240 * 640 + 320]);
   const CameraPose wall = over_the_floor(1.2f, 0);
   EXPECT_NE(render(straight, wall).luminance, render(bent, wall).luminance);
+}
+
+TEST(Renderer, NoRaySlipsThroughAFacesDiagonal) {
+  World world = glowing_world();
+  add_board(world, {8, 0, 0}, 90, 90, 20);
+  Renderer renderer(std::move(world), pinhole(160, 64, 260));  // pixels (u, u - 48) look exactly along a diagonal
+  CastFrame frame = renderer.frame();
+  renderer.cast(northward(), frame);
+  for (const float range : frame.range) ASSERT_FLOAT_EQ(range, 8);
 }
 
 TEST(Renderer, RefusesSizesThatAreNotMultiplesOfFour) {

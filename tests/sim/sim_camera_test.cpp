@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "sim/scene.h"
+
 namespace wasp::sim {
 namespace {
 
@@ -46,6 +48,60 @@ TEST(SimCamera, SaysOnceThatAFrameIsAlmostDoneWhenOnlyTheLastRowsAreMissing) {
   EXPECT_EQ(calls, 1);
   EXPECT_LE(first_missing, static_cast<std::size_t>(640 * (480 - SimCamera::kLastRows)));
   EXPECT_GT(first_missing, static_cast<std::size_t>(640 * 400));
+}
+
+CameraSetup everything_on() {
+  CameraSetup setup = SimConfig{}.down.setup;
+  setup.optics.antialias = true;
+  setup.optics.aperture_m = 0.01f;
+  setup.optics.exposure_s = 0.02f;
+  return setup;
+}
+
+TEST(SimCamera, TwoCamerasOfOneWorldGiveTheSameFramesInAnyOrder) {
+  const auto scene = std::make_shared<const WorldScene>(placed_at_start(make_scene("corridor", 3)));
+  const CameraSetup setup = everything_on();
+  SimCamera a(scene, setup, {}, 7), b(scene, setup, {}, 7), other(scene, setup, {}, 8);
+  BodyPose pose{0, {2, 0, -1}, quat_from_euler({0.1f, 0, 0.3f}), {1, 2, 0}, {0, 0.5f, 1}};
+  std::vector<std::uint8_t> first(320 * 240), second(first.size());
+  a.render(pose, 4, first.data(), nullptr);
+  b.render(moved(pose, 0.5f), 9, second.data(), nullptr);
+  EXPECT_NE(first, second);
+  b.render(pose, 4, second.data(), nullptr);
+  EXPECT_EQ(first, second) << "a pure function of seed, frame and pose";
+  other.render(pose, 4, second.data(), nullptr);
+  EXPECT_NE(first, second) << "another sensor's noise";
+  pose.velocity_ned_mps.setZero(), pose.rate_body_radps.setZero();
+  b.render(pose, 4, second.data(), nullptr);
+  EXPECT_NE(first, second) << "blurred by its motion";
+}
+
+TEST(SimCamera, TheFisheyeBelowIsBlackBeyondItsFieldAndSeesTheFloorWithin) {
+  SimConfig config;
+  config.sensor.noise = false;
+  SimCamera camera(make_world_scene(config), config.down.setup, config.sensor, down_seed(config.seed));
+  std::vector<std::uint8_t> gray(320 * 240);
+  camera.render({0, {0, 0, -1.05f}, Quat::Identity()}, 0, gray.data(), nullptr);
+  EXPECT_EQ(gray[0], 0);
+  EXPECT_EQ(gray[120 * 320 + 10], 0);
+  EXPECT_GT(gray[120 * 320 + 160], 20);
+  EXPECT_NEAR(camera.ideal().range[120 * 320 + 160], 1, 0.01) << "5 cm below the body";
+}
+
+TEST(SimCamera, DepthOfTheFrontCameraIsTheSameWithAndWithoutBlur) {
+  SimConfig config;
+  const auto scene = make_world_scene(config);
+  CameraSetup plain = config.front(), blurred = plain;
+  plain.optics.antialias = false;
+  blurred.optics.aperture_m = 0.01f, blurred.optics.exposure_s = 0.02f;
+  SimCamera sharp(scene, plain, config.sensor, 1), soft(scene, blurred, config.sensor, 1);
+  const BodyPose pose{0, {0, 0, -1}, Quat::Identity(), {1, 2, 0}, {0, 0.5f, 1}};
+  std::vector<std::uint8_t> gray(640 * 480), gray_soft(gray.size());
+  std::vector<std::uint16_t> depth(gray.size()), depth_soft(gray.size());
+  sharp.render(pose, 4, gray.data(), depth.data());
+  soft.render(pose, 4, gray_soft.data(), depth_soft.data());
+  EXPECT_NE(gray, gray_soft);
+  EXPECT_EQ(depth, depth_soft);
 }
 
 TEST(SimCamera, InterpolatesPoses) {

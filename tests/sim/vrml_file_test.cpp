@@ -54,7 +54,7 @@ Picture picture_of(const Scene& scene) {
 class EveryKind : public VrmlFile, public testing::WithParamInterface<SceneKind> {};
 
 TEST_P(EveryKind, LooksTheSameAfterWritingAndReading) {
-  Scene scene = GetParam().make(3);
+  Scene scene = GetParam().make({.seed = 3});
   scene.start_yaw_rad = 0.3f;
   write_vrml(scene, folder_ / "world.wrl");
   const Scene again = read_vrml(folder_ / "world.wrl");
@@ -76,7 +76,7 @@ TEST_P(EveryKind, LooksTheSameAfterWritingAndReading) {
 }
 
 TEST_P(EveryKind, SeedDecidesAndNothingStandsWhereTheFlightBegins) {
-  const Picture one = picture_of(GetParam().make(1)), other = picture_of(GetParam().make(2));
+  const Picture one = picture_of(GetParam().make({.seed = 1})), other = picture_of(GetParam().make({.seed = 2}));
   if (std::string(GetParam().name) != "arena") {
     EXPECT_NE(one.luminance, other.luminance);
   }

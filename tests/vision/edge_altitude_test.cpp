@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
@@ -97,6 +98,57 @@ TEST(EdgeAltitude, AllocatesNothingAndReplaysToTheBit) {
   }
   EXPECT_EQ(count.violations(), 0u);
   EXPECT_EQ(std::memcmp(&a, &b, sizeof a), 0);
+}
+
+/// Up one metre between 3 and 6 s, smoothly.
+float course_m(double t_s) {
+  const double s = std::clamp((t_s - 3.0) / 3.0, 0.0, 1.0);
+  return static_cast<float>(1.0 + s * s * (3 - 2 * s));
+}
+
+TEST(EdgeAltitude, FindsLambdaFromAClimbThatInertiaMeasured) {
+  EdgeAltitude::Params params = downward();
+  params.estimate_lambda = 1;
+  params.height.edges_per_m = 45.f;  // a wrong guess: half the height
+  EdgeAltitude::State state;
+  CueBody cue;
+  const double dt = 0.05;
+  const auto speed = [](double t) { return (course_m(t + 1e-2) - course_m(t - 1e-2)) / 2e-2f; };
+  float first_m = 0;
+  for (int i = 0; i < 200; ++i) {
+    const double t = i * dt;
+    const auto image = chequers(course_m(t));
+    BehaviourInput input = input_of(image, static_cast<TimeNs>(t * 1e9));
+    const float up_mps2 = (speed(t) - speed(t - dt)) / static_cast<float>(dt) + 0.03f;  // biased
+    const Quat q = quat_from_euler({0.f, 0.f, 1.f});
+    input.attitude.q_ned_body = {q.w(), q.x(), q.y(), q.z()};
+    input.accel_valid = true;
+    input.accel_body_mps2 = {0.f, 0.f, -(9.80665f + up_mps2)};
+    cue = EdgeAltitude::step(params, input, state);
+    ASSERT_EQ(cue.validity, Validity::kValid);
+    if (i == 0) {
+      first_m = cue.height_m;
+      EXPECT_EQ(cue.detail[EdgeAltitude::kEdgesPerM], 45.f);
+      EXPECT_EQ(cue.detail[EdgeAltitude::kEdgesPerMSigma], 0.f);
+    }
+  }
+  EXPECT_LT(first_m, 0.65f);
+  ASSERT_GT(state.density.density.accepted, 0);
+  EXPECT_NEAR(cue.height_m, 2.f, 0.3f);
+  EXPECT_GT(cue.detail[EdgeAltitude::kEdgesPerMSigma], 0.f);
+  EXPECT_LT(cue.detail[EdgeAltitude::kEdgesPerMSigma], 0.15f * cue.detail[EdgeAltitude::kEdgesPerM]);
+  EXPECT_NEAR(cue.height_m, cue.detail[EdgeAltitude::kRawHeight_m], 0.02f);  // the filter went along
+}
+
+TEST(EdgeAltitude, WithoutAccelerationTheGivenLambdaHolds) {
+  EdgeAltitude::Params params = downward();
+  params.estimate_lambda = 1;
+  EdgeAltitude::State state;
+  CueBody cue;
+  const auto image = chequers(1.f);
+  for (int i = 0; i < 20; ++i) cue = EdgeAltitude::step(params, input_of(image, i * 50 * kMillisecond), state);
+  EXPECT_EQ(state.density.count, 0);
+  EXPECT_EQ(cue.detail[EdgeAltitude::kEdgesPerM], 20.f);
 }
 
 TEST(EdgeAltitude, FollowsARealDescent) {

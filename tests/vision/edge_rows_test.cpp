@@ -122,6 +122,31 @@ TEST(EdgeRows, MasksFarEdgesAndKeepsThoseOfUnknownDepth) {
   EXPECT_EQ(rows->count[31], 62 - 10);
 }
 
+TEST(EdgeRows, MasksEdgesOfUnknownDepthWhereAsked) {
+  Picture p{64, 64, 64, std::vector<std::uint8_t>(64 * 64, 200)};
+  std::fill(p.pixels.begin() + 32 * 64, p.pixels.end(), std::uint8_t{50});
+  std::vector<std::uint16_t> depth(64 * 64, 2999);
+  for (std::size_t v = 0; v < 64; ++v)
+    for (std::size_t u = 0; u < 64; ++u)
+      if (u >= 40) depth[v * 64 + u] = u >= 60 ? 65535 : u >= 50 ? 0 : 3000;
+  auto rows = std::make_unique<EdgeRows>();
+  count_edge_rows({.mask_beyond_m = 3.f, .mask_unknown = true}, p.view(), {depth.data(), 64, 64, 64}, *rows);
+  EXPECT_EQ(rows->count[31], 39);
+  count_edge_rows({.mask_beyond_m = 3.f}, p.view(), {depth.data(), 64, 64, 64}, *rows);
+  EXPECT_EQ(rows->count[31], 39 + 13);
+}
+
+TEST(EdgeRows, AFixedThresholdStandsInForTheRms) {
+  const Picture p = noise(64, 64, 3);
+  auto rows = std::make_unique<EdgeRows>();
+  count_edge_rows({.fixed_threshold = 600}, p.view(), {}, *rows);
+  EXPECT_EQ(rows->threshold, 600);
+  int count = 0;
+  for (int u = 1; u < 63; ++u) count += std::abs(plain_sobel(p, u, 20).v) >= 600 ? 1 : 0;
+  EXPECT_EQ(rows->count[20], count);
+  EXPECT_GT(count, 0);
+}
+
 void expect_same(const EdgeRowsParams& params, const GrayView& image, const DepthView& depth) {
   auto simd = std::make_unique<EdgeRows>(), plain = std::make_unique<EdgeRows>();
   count_edge_rows(params, image, depth, *simd);
@@ -152,11 +177,13 @@ TEST(EdgeRows, SimdEqualsTheReferenceToTheLastBit) {
       std::vector<std::uint16_t> mm(p.pixels.size());
       for (auto& x : mm) x = static_cast<std::uint16_t>(random() % 4 == 0 ? (random() & 1) * 65535 : random() % 5000);
       for (const EdgeKind kind : {EdgeKind::kBrighterBelow, EdgeKind::kHorizontal, EdgeKind::kAnyDirection})
-        for (const float mask_m : {0.f, 2.5f, 60.f}) {
-          SCOPED_TRACE(testing::Message() << width_px << "x" << height_px << " levels " << levels << " kind "
-                                          << static_cast<int>(kind) << " mask " << mask_m);
-          expect_same({.kind = kind, .mask_beyond_m = mask_m}, p.view(), {mm.data(), width_px, height_px, width_px});
-        }
+        for (const float mask_m : {0.f, 0.0011f, 2.5f, 64.999f})
+          for (const bool unknown : {false, true}) {
+            SCOPED_TRACE(testing::Message() << width_px << "x" << height_px << " levels " << levels << " kind "
+                                            << static_cast<int>(kind) << " mask " << mask_m << unknown);
+            expect_same({.kind = kind, .mask_beyond_m = mask_m, .mask_unknown = unknown}, p.view(),
+                        {mm.data(), width_px, height_px, width_px});
+          }
     }
 }
 

@@ -37,8 +37,11 @@ void run(const Sweeps& sweeps, const EdgeRowsParams& params, const GrayView& ima
   const double pixels = static_cast<double>(image.width_px - 2) * (image.height_px - 2);
   const double rms = std::sqrt(static_cast<double>(sweeps.squares(image, params.kind)) / pixels);
   out.gradient_rms = static_cast<float>(rms);
-  out.threshold = std::max(std::clamp(params.min_threshold, 1, 1024), static_cast<int>(std::ceil(rms)));
-  sweeps.count({image, depth, params.kind, out.threshold, mask_limit_mm(params, image, depth)}, out);
+  out.threshold = params.fixed_threshold > 0
+                      ? std::min(params.fixed_threshold, 2047)
+                      : std::max(std::clamp(params.min_threshold, 1, 1024), static_cast<int>(std::ceil(rms)));
+  sweeps.count({image, depth, params.kind, out.threshold, mask_limit_mm(params, image, depth), params.mask_unknown},
+               out);
   for (int v = 1; v < image.height_px - 1; ++v) out.total += out.count[static_cast<std::size_t>(v)];
 }
 

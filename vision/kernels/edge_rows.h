@@ -22,7 +22,9 @@ enum class EdgeKind : std::uint8_t { kBrighterBelow, kHorizontal, kAnyDirection 
 struct EdgeRowsParams {
   EdgeKind kind = EdgeKind::kHorizontal;
   int min_threshold = 8;      ///< Sobel units: below this the RMS is sensor noise, not structure
+  int fixed_threshold = 0;    ///< Sobel units; > 0: used instead of the RMS (a lens out of focus sets the scale)
   float mask_beyond_m = 0.f;  ///< edges at or beyond this depth do not count (7.41); 0 switches the mask off
+  bool mask_unknown = false;  ///< an edge without a depth reading counts as far: masked too
 };
 
 /// Row histogram. Rows 0 and height-1 and columns 0 and width-1 have no Sobel value and no edges.
@@ -35,8 +37,8 @@ struct EdgeRows {
   std::array<std::int32_t, kMaxEdgeRows> count{};  ///< E_v, by image row
 };
 
-/// Counts edges of `image`. `depth` (same size, 0 = unknown = not masked) may be empty. Invalid for a bad view, fewer
-/// than 3 x 3 pixels or a larger image than the limits. Realtime-safe: yes.
+/// Counts edges of `image`. `depth` (same size; 0 and 65,535 = unknown) may be empty: then nothing is masked. Invalid
+/// for a bad view, fewer than 3 x 3 pixels or a larger image than the limits. Realtime-safe: yes.
 void count_edge_rows(const EdgeRowsParams& params, const GrayView& image, const DepthView& depth,
                      EdgeRows& out) WASP_REALTIME;
 

@@ -78,12 +78,14 @@ int count_magnitude(const MagnitudeRow& m, int n, int threshold) noexcept {
   return count;
 }
 
-/// Zeroes what lies at or beyond `limit_mm`; unknown depth (0, 65535) stays.
+/// Zeroes what lies at or beyond the limit, and what has no depth (0, 65535) if that is to be masked.
 template <class Row>
-void mask_row(Row& g, const std::uint16_t* depth_mm, int n, int limit_mm) noexcept {
-  for (int u = 0; u < n; ++u) {
+void mask_row(Row& g, const EdgeSweep& sweep, int v) noexcept {
+  const std::uint16_t* depth_mm = sweep.depth.row(v);
+  for (int u = 0; u < sweep.image.width_px - 2; ++u) {
     const int mm = depth_mm[u + 1];
-    if (mm >= limit_mm && mm != 65535) g[static_cast<std::size_t>(u)] = 0;
+    const bool unknown = mm == 0 || mm == 65535;
+    if (unknown ? sweep.mask_unknown : mm >= sweep.limit_mm) g[static_cast<std::size_t>(u)] = 0;
   }
 }
 
@@ -98,10 +100,10 @@ struct RowCounter {
     if (sweep.kind == EdgeKind::kAnyDirection) {
       MagnitudeRow m;
       magnitude_row(image, v, g, m);
-      if (sweep.limit_mm > 0) mask_row(m, sweep.depth.row(v), n, sweep.limit_mm);
+      if (sweep.limit_mm > 0) mask_row(m, sweep, v);
       return count_magnitude(m, n, sweep.threshold);
     }
-    if (sweep.limit_mm > 0) mask_row(g, sweep.depth.row(v), n, sweep.limit_mm);
+    if (sweep.limit_mm > 0) mask_row(g, sweep, v);
     return sweep.kind == EdgeKind::kHorizontal ? count_both(g, n, sweep.threshold)
                                                : count_brighter(g, n, sweep.threshold);
   }

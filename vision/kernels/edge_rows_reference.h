@@ -14,8 +14,9 @@ struct EdgeSweep {
   GrayView image;
   DepthView depth;  ///< looked at only if limit_mm > 0; then of the image's size
   EdgeKind kind = EdgeKind::kHorizontal;
-  int threshold = 1;  ///< 1 ... 2,047
-  int limit_mm = 0;   ///< edges at or beyond this depth do not count; 0: no mask
+  int threshold = 1;          ///< 1 ... 2,047
+  int limit_mm = 0;           ///< edges at or beyond this depth do not count, 1 ... 64,999; 0: no mask
+  bool mask_unknown = false;  ///< nor do those of unknown depth
 };
 
 /// Sum of squared gradients over interior pixels. Exact. Realtime-safe: yes.

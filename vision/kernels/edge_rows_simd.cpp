@@ -188,15 +188,24 @@ HWY_INLINE int total_of(Words counts) {
   return static_cast<int>(hn::GetLane(hn::SumOfLanes(kUints, sums)));
 }
 
-/// All ones where the depth of an interior pixel lets its edge count: nearer than the limit, or unknown.
-HWY_INLINE Block near_enough(const std::uint16_t* mm, std::size_t u, Words limit) {
+/// Depth and limit are moved on the circle of 16 bits, so that one comparison sorts unknown depth (0, 65535) as well:
+/// by +1 to the near side, by -1 to the far side.
+struct Nearness {
+  Words shift, limit;
+
+  HWY_INLINE explicit Nearness(const EdgeSweep& sweep)
+      : shift(hn::Set(kWords, static_cast<std::uint16_t>(sweep.mask_unknown ? 65535 : 1))),
+        limit(hn::Add(hn::Set(kWords, static_cast<std::uint16_t>(sweep.limit_mm)), shift)) {}
+};
+
+/// All ones where the depth of an interior pixel lets its edge count.
+HWY_INLINE Block near_enough(const std::uint16_t* mm, std::size_t u, const Nearness& near) {
   const std::size_t lanes = hn::Lanes(kWords);
   const Words low = hn::LoadU(kWords, mm + u + 1), high = hn::LoadU(kWords, mm + u + 1 + lanes);
-  const Words unknown = hn::Set(kWords, std::uint16_t{65535}), zero = hn::Zero(kWords);
+  const Words zero = hn::Zero(kWords);
   const auto keeps = [&](Words x) HWY_ATTR {
-    const auto far = hn::Eq(hn::SaturatedSub(limit, x), zero);  // x >= limit
-    const Words masked_out = hn::AndNot(hn::VecFromMask(kWords, hn::Eq(x, unknown)), hn::VecFromMask(kWords, far));
-    return hn::BitCast(kShorts, hn::Not(masked_out));
+    const auto far = hn::Eq(hn::SaturatedSub(near.limit, hn::Add(x, near.shift)), zero);  // x >= limit
+    return hn::BitCast(kShorts, hn::Not(hn::VecFromMask(kWords, far)));
   };
   return {keeps(hn::ConcatEven(kWords, high, low)), keeps(hn::ConcatOdd(kWords, high, low))};
 }
@@ -218,12 +227,12 @@ HWY_INLINE Words magnitude_at_least(Shorts gu, Shorts gv, Ints below) {
 template <class Marks>
 HWY_INLINE void count_with(const EdgeSweep& sweep, const Marks& marks, EdgeRows& out) {
   Words counts = hn::Zero(kWords);
-  const Words limit = hn::Set(kWords, static_cast<std::uint16_t>(sweep.limit_mm));
+  const Nearness near(sweep);
   const auto begin = [&]() HWY_ATTR { counts = hn::Zero(kWords); };
   const auto end = [&](int v) HWY_ATTR { out.count[static_cast<std::size_t>(v)] = total_of(counts); };
   if (sweep.limit_mm > 0) {
     const auto use = [&](int v, std::size_t u, const Block& g) HWY_ATTR {
-      const Block keep = near_enough(sweep.depth.row(v), u, limit);
+      const Block keep = near_enough(sweep.depth.row(v), u, near);
       counts = hn::Add(counts, marks(v, u, g, &keep));
     };
     sweep_gradient(sweep.image, begin, use, end);

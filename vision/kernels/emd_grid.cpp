@@ -72,6 +72,24 @@ void EmdGrid::correlate(EmdField& out) const noexcept {
     }
 }
 
+void EmdGrid::fire(float min_response, EmdRows& out) const noexcept {
+  out = {};
+  if (frames_ < 2 || down_ - 1 > EmdRows::kMax) return;
+  out.rows = down_ - 1;
+  out.columns = across_;
+  out.pitch_px = params_.pitch_px;
+  float squares = 0.f;
+  for (int r = 0; r < out.rows; ++r)
+    for (int c = 0; c < across_; ++c) squares += down(c, r) * down(c, r);
+  out.threshold = std::max(min_response, std::sqrt(squares / static_cast<float>(across_ * out.rows)));
+  for (int r = 0; r < out.rows; ++r) {
+    std::int32_t count = 0;
+    for (int c = 0; c < across_; ++c) count += std::abs(down(c, r)) >= out.threshold ? 1 : 0;
+    out.count[static_cast<std::size_t>(r)] = count;
+    out.total += count;
+  }
+}
+
 void EmdGrid::step(const GrayView& image, EmdField& out) noexcept {
   out = {};
   out.columns = params_.columns;

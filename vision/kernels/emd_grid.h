@@ -8,6 +8,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <vector>
 
 #include "types/image_view.h"
@@ -35,6 +36,18 @@ struct EmdField {
   std::array<EmdCell, FlowField::kMaxColumns * FlowField::kMaxRows> cells{};
 };
 
+/// Vertical correlators that fire, by row of the lattice: correlator row r looks at the border of lattice rows r and
+/// r + 1, image row (r + 1) * pitch - 0.5. An edge detector that needs motion (thesis 8.1.3), as a row histogram.
+struct EmdRows {
+  static constexpr int kMax = 512;
+  int rows = 0;  ///< correlator rows; 0 until two frames were seen
+  int pitch_px = 0;
+  int columns = 0;         ///< correlators in a row
+  float threshold = 0;     ///< |response| from which one fires [grey^2]
+  std::int64_t total = 0;  ///< how many fire
+  std::array<std::int32_t, kMax> count{};
+};
+
 class EmdGrid {
  public:
   /// Takes all memory. Throws std::invalid_argument for parameters out of range, or when a cell would hold fewer than
@@ -45,6 +58,11 @@ class EmdGrid {
   /// alone and gives an invalid field. Time depends on sizes only. Realtime-safe: yes.
   void step(const GrayView& image, EmdField& out) WASP_REALTIME;
 
+  /// Which vertical correlators fire after the frames so far: |response| at least its RMS over the lattice, the
+  /// threshold of (7.33) carried over, and at least `min_response` [grey^2]. No rows when the lattice is higher than
+  /// EmdRows::kMax. Realtime-safe: yes.
+  void fire(float min_response, EmdRows& out) const WASP_REALTIME;
+
   /// Forgets all frames. Realtime-safe: yes.
   void reset() WASP_REALTIME { frames_ = 0; }
 
@@ -54,6 +72,10 @@ class EmdGrid {
   };
   [[nodiscard]] const Receptor& at(int column, int row) const WASP_REALTIME {
     return receptors_[static_cast<std::size_t>(row * across_ + column)];
+  }
+  [[nodiscard]] float down(int column, int row) const WASP_REALTIME {
+    const Receptor &a = at(column, row), &below = at(column, row + 1);
+    return a.delayed * below.signal - a.signal * below.delayed;
   }
   void see(const GrayView& image) WASP_REALTIME;
   void correlate(EmdField& out) const WASP_REALTIME;

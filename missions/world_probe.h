@@ -1,0 +1,32 @@
+// Asks the world of a mission for distances: how near the vehicle came to anything, and what lies below it.
+#pragma once
+
+#include <memory>
+
+#include "missions/flight_trace.h"
+#include "missions/mission_setup.h"
+
+namespace wasp::missions {
+
+class WorldProbe {
+ public:
+  /// Builds the mission's world for its seed.
+  explicit WorldProbe(const MissionSetup& setup);
+  ~WorldProbe();
+
+  /// What is around the vehicle's centre (sim/clearance.h), `flight_time_s` after lift-off.
+  struct Look {
+    double around_m = 0, below_m = 0;  ///< nearest surface beside or above, and below; at most 3 m
+    bool collides = false;             ///< with something it does not stand or land on
+    bool collides_in_flight = false;   ///< or with what is below
+  };
+  [[nodiscard]] Look look(const Truth& truth, double flight_time_s) const;
+  /// From the vehicle's centre straight down to the ground or a roof [m]; 0 where there is nothing.
+  [[nodiscard]] double height_over(const Truth& truth) const;
+
+ private:
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+};
+
+}  // namespace wasp::missions
