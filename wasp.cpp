@@ -23,6 +23,9 @@ using namespace wasp;
 constexpr const char* kUsage =
     "usage: wasp SUBCOMMAND [options]    (wasp SUBCOMMAND --help for each)\n"
     "  fly      fly a mission, in the simulator or on a recording, and write a report\n"
+    "  campaign a mission many times in lockstep on virtual time, held against its bars\n"
+    "  reproduce every experiment of the thesis, and one page with its figures beside ours\n"
+    "  judge    a recorded flight held against the bars of its mission\n"
     "  flight   the flying process alone (fly starts it)\n"
     "  plan     can the thread table keep its deadlines? response times, before any flight\n"
     "  sim      the simulator: camera and autopilot as another process\n"

@@ -1,6 +1,7 @@
 // wasp bench render: what a simulated frame costs, in one thread, with noise and (for a pinhole) depth: worlds by sizes
 // by optics, along the same swerving flight. Time is the thread's own processor time, so that others on the machine
-// disturb little; the bar is a frame in 1/30 s. Every row: median and p99 of a frame, frames a second of the whole row.
+// disturb little; the bar is a frame in 1/30 s for every row but those with all optics at once. Every row: median and
+// p99 of a frame, frames a second of the whole row.
 #include <ctime>
 #include <string>
 #include <vector>
@@ -43,7 +44,8 @@ constexpr Optics kOptics[] = {
      }},
     {"pinhole defocus 5 mm", [](CameraSetup& s) { s.optics.aperture_m = 0.005f; }},
     {"pinhole motion 10 ms", [](CameraSetup& s) { s.optics.exposure_s = 0.01f; }},
-    {"pinhole all", [](CameraSetup& s) { s.optics = {.antialias = true, .aperture_m = 0.005f, .exposure_s = 0.01f}; }},
+    {"pinhole all on",
+     [](CameraSetup& s) { s.optics = {.antialias = true, .aperture_m = 0.005f, .exposure_s = 0.01f}; }},
 };
 
 CameraSetup setup_of(int width_px, int height_px) {
@@ -89,9 +91,12 @@ void measure(Report& report, const std::string& name, SimCamera& camera, bool de
     spent_ns += took_ns;
     frames_ns.push_back(static_cast<std::int64_t>(took_ns));
   }
+  const bool judged = name.find("all on") == std::string::npos;  // everything at once is told, not promised
   const double rate_hz = 1e9 * static_cast<double>(frames_ns.size()) / spent_ns;
   const Quantiles q = quantiles(frames_ns);
-  report.bar(name + ".p50", q.p50 * 1e-6, "ms", kBar_ms, std::to_string(static_cast<int>(rate_hz)) + " frames/s");
+  const std::string rate = std::to_string(static_cast<int>(rate_hz)) + " frames/s";
+  if (judged) report.bar(name + ".p50", q.p50 * 1e-6, "ms", kBar_ms, rate);
+  if (!judged) report.figure(name + ".p50", q.p50 * 1e-6, "ms", rate);
   report.figure(name + ".p99", q.p99 * 1e-6, "ms");
 }
 

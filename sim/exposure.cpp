@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "vision/kernels/derotate.h"
 
@@ -9,6 +10,11 @@ namespace wasp::sim {
 namespace {
 
 constexpr float kSky_m = 1e4f;
+/// How far aside the casts look, in the order of time. They sum to zero, so that nothing shifts, and hardly go along
+/// with time, so that no smear grows or shrinks.
+constexpr float kAsideOfThree_px[3][2] = {{0.125f, -0.375f}, {0, 0}, {-0.125f, 0.375f}};
+constexpr float kAsideOfFive_px[5][2] = {
+    {0.375f, -0.125f}, {-0.375f, 0.125f}, {0, 0}, {-0.125f, -0.375f}, {0.125f, 0.375f}};
 
 }  // namespace
 
@@ -40,8 +46,9 @@ float Exposure::motion_px(const Renderer& renderer, const BodyPose& pose, const 
   return longest;
 }
 
-int Exposure::apply(Renderer& renderer, const BodyPose& pose, CastFrame& frame) {
+int Exposure::apply(const Renderer& renderer, const BodyPose& pose, CastFrame& frame) {
   const float motion = motion_px(renderer, pose, frame);
+  static_assert(kMostCasts == std::size(kAsideOfFive_px));
   if (!(motion > kStill_px)) return 1;
   const int pairs = std::clamp(static_cast<int>(std::ceil(0.5f * (motion / kStep_px - 1))), 1, (kMostCasts - 1) / 2);
   const int casts = 2 * pairs + 1;
@@ -49,8 +56,8 @@ int Exposure::apply(Renderer& renderer, const BodyPose& pose, CastFrame& frame) 
     if (i == 0) continue;
     const float after_s = exposure_s_ * static_cast<float>(i) / static_cast<float>(casts);
     const CameraPose camera = camera_pose_of(moved(pose, after_s), geometry_);
-    renderer.cast(camera, other_);
-    if (antialias_) renderer.antialias(camera, other_);
+    const float* aside = casts == 3 ? kAsideOfThree_px[i + 1] : kAsideOfFive_px[i + 2];
+    renderer.cast(camera, other_, antialias_ ? aside[0] : 0.f, antialias_ ? aside[1] : 0.f);
     for (std::size_t at = 0; at < frame.luminance.size(); ++at) frame.luminance[at] += other_.luminance[at];
   }
   const float share = 1.f / static_cast<float>(casts);

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "types/attitude.h"
+#include "types/attitude_at.h"
 
 namespace wasp::sim {
 namespace {
@@ -112,7 +112,7 @@ void Lockstep::step_all(bool down, BehaviourInput input) {
   const auto after = std::find_if(attitudes_.rbegin(), attitudes_.rend(),
                                   [&](const auto& a) { return a.exposed_at_ns <= input.exposed_at_ns; });
   input.attitude_valid = after != attitudes_.rend();
-  if (input.attitude_valid) input.attitude = attitude_turned_on(*after, input.exposed_at_ns);
+  if (input.attitude_valid) input.attitude = attitude_at(*after, nullptr, input.exposed_at_ns);
   const FlowMessage* flow = nullptr;
   for (const bool reads_flow : {false, true})
     for (const LockstepBehaviour& b : options_.behaviours) {

@@ -40,12 +40,13 @@ class PacketCast {
     }
   }
 
-  /// `pixel` scales the footprint. Afterwards `luminance`, `range` and `face` hold what the rays see.
-  void cast(const RayPacket& rays, float pixel) {
+  /// `pixel` scales the footprint, `aside` is added to every direction. Afterwards `luminance`, `range` and `face` hold
+  /// what the rays see.
+  void cast(const RayPacket& rays, float pixel, const Vec3& aside = Vec3::Zero()) {
     const Mat3& R = pose_.R_ned_cam;
     RTCRay16& ray = packet_.ray;
     for (int i = 0; i < 16; ++i) {
-      const float x = rays.x[i], y = rays.y[i], z = rays.z[i];
+      const float x = rays.x[i] + aside.x(), y = rays.y[i] + aside.y(), z = rays.z[i] + aside.z();
       hits_.dir_x[i] = ray.dir_x[i] = R(0, 0) * x + R(0, 1) * y + R(0, 2) * z;
       hits_.dir_y[i] = ray.dir_y[i] = R(1, 0) * x + R(1, 1) * y + R(1, 2) * z;
       hits_.dir_z[i] = ray.dir_z[i] = R(2, 0) * x + R(2, 1) * y + R(2, 2) * z;

@@ -27,33 +27,33 @@ CastFrame Renderer::frame() const {
   return CastFrame(static_cast<std::size_t>(width_px()) * static_cast<std::size_t>(height_px()));
 }
 
-void Renderer::cast_band(const CameraPose& pose, int first_row, float* luminance, float* range,
-                         std::uint32_t* face) const {
+void Renderer::cast_band(const CameraPose& pose, int first_row, float right_px, float down_px, const Band& to) const {
   PacketCast packet(*scene_, pose);
   const auto width = static_cast<std::size_t>(width_px());
   for (std::size_t column = 0; column < width / 4; ++column) {
     const RayPacket& rays = rays_.packet(first_row / 4, static_cast<int>(column));
-    packet.cast(rays, rays.pixel);
+    packet.cast(rays, rays.pixel, right_px * rays.du + down_px * rays.dv);
     for (std::size_t row = 0; row < 4; ++row) {
       const std::size_t at = row * width + column * 4;
-      std::memcpy(luminance + at, packet.luminance + 4 * row, 4 * sizeof(float));
-      std::memcpy(range + at, packet.range + 4 * row, 4 * sizeof(float));
-      if (face != nullptr) std::memcpy(face + at, packet.face + 4 * row, 4 * sizeof(float));
+      std::memcpy(to.luminance + at, packet.luminance + 4 * row, 4 * sizeof(float));
+      std::memcpy(to.range + at, packet.range + 4 * row, 4 * sizeof(float));
+      if (to.face != nullptr) std::memcpy(to.face + at, packet.face + 4 * row, 4 * sizeof(float));
     }
   }
 }
 
-void Renderer::cast(const CameraPose& pose, CastFrame& frame) const {
+void Renderer::cast(const CameraPose& pose, CastFrame& frame, float right_px, float down_px) const {
   const FlushDenormals flush;
   for (int row = 0; row < height_px(); row += kBandRows) {
     const std::size_t at = static_cast<std::size_t>(row) * static_cast<std::size_t>(width_px());
-    cast_band(pose, row, frame.luminance.data() + at, frame.range.data() + at, frame.face.data() + at);
+    cast_band(pose, row, right_px, down_px,
+              {frame.luminance.data() + at, frame.range.data() + at, frame.face.data() + at});
   }
 }
 
 void Renderer::render_band(const CameraPose& pose, int first_row, float* luminance, float* depth_m) const {
   const FlushDenormals flush;
-  cast_band(pose, first_row, luminance, depth_m, nullptr);
+  cast_band(pose, first_row, 0, 0, {luminance, depth_m, nullptr});
   for (int i = 0; i < kBandRows; ++i) {
     float* row = depth_m + i * width_px();
     depth_row(first_row + i, row, row);

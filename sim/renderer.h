@@ -39,8 +39,8 @@ class Renderer {
 
   /// A frame of this renderer's size.
   [[nodiscard]] CastFrame frame() const;
-  /// One ray for each pixel. Allocates nothing, as nothing below.
-  void cast(const CameraPose& pose, CastFrame& frame) const;
+  /// One ray for each pixel, this far to the right of and below its centre. Allocates nothing, as nothing below.
+  void cast(const CameraPose& pose, CastFrame& frame, float right_px = 0, float down_px = 0) const;
   /// Smooths the edges of a frame just cast from `pose`. One thread at a time.
   void antialias(const CameraPose& pose, CastFrame& frame);
   /// Rows [first_row, first_row + kBandRows) of a cast: luminance and optical-axis depth (0 where nothing is hit and,
@@ -59,7 +59,11 @@ class Renderer {
   [[nodiscard]] std::size_t edge_pixels() const { return edges_.size(); }
 
  private:
-  void cast_band(const CameraPose& pose, int first_row, float* luminance, float* range, std::uint32_t* face) const;
+  struct Band {
+    float *luminance, *range;
+    std::uint32_t* face;  ///< nullptr: not wanted
+  };
+  void cast_band(const CameraPose& pose, int first_row, float right_px, float down_px, const Band& to) const;
   void find_edges(const CastFrame& frame);
   float aim(RayPacket& rays, std::uint32_t at, std::size_t k, bool used) const;
 

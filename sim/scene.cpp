@@ -14,6 +14,7 @@ Scene laboratory(const SceneOptions& o) {
 }
 Scene arena(const SceneOptions& o) { return make_arena(o.seed, 1.f); }
 Scene arena_step(const SceneOptions& o) { return make_arena(o.seed, arena_step_of(o.seed, o.arena_step_at_s)); }
+Scene city(const SceneOptions& o) { return make_city(o.seed, o.city); }
 Scene edges(const SceneOptions& o) { return make_edges(o.seed, o.ground_edges_per_m); }
 
 /// A generator that asks for nothing but a seed.
@@ -30,7 +31,7 @@ constexpr SceneKind kKinds[] = {
     {"corridor-obstacles", "cartons along the walls, a way left between them", &seeded<make_corridor_obstacles>},
     {"corridor-people", "cartons along one wall, two people walking along the other", &seeded<make_corridor_people>},
     {"office", "twelve rooms with doors, desks and cabinets", &seeded<make_office>},
-    {"city", "70 m of low boxes, heights a sinusoidally modulated exponential", &seeded<make_city>},
+    {"city", "70 m of low boxes, heights a sinusoidally modulated exponential", &city},
     {"city-tall", "the same to 15 m height, 200 m long", &seeded<make_city_tall>},
     {"arena", "Straw's round arena, edge at 1 m", &arena},
     {"arena-step", "the same, softly textured; the edge moves by a step up or down", &arena_step},

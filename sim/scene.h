@@ -19,6 +19,17 @@ struct Scene {
 /// Moves the world so that the start is the origin and its heading north: what the simulator flies in.
 World placed_at_start(const Scene& scene);
 
+/// The low city: boxes on a square grid, each within its own cell.
+struct CityOptions {
+  double length_m = 70, half_width_m = 26;     ///< along x; to either side
+  double free_before_m = 6, free_after_m = 8;  ///< no boxes within these of the ends
+  double pitch_m = 3;                          ///< of the grid; a box fills 72 to 92 % of it each way
+  double mean_low_m = 0.6, mean_high_m = 2;    ///< of the exponential, where the sinusoid is low and high
+  double period_m = 25;                        ///< of the sinusoid along x
+  double lowest_m = 0.3, tallest_m = 4;        ///< heights are cut to these
+  double windowed = 0.3;                       ///< share of boxes with windows
+};
+
 /// What decides a generated scene, besides its kind.
 struct SceneOptions {
   std::uint32_t seed = 1;
@@ -26,6 +37,7 @@ struct SceneOptions {
   int cartons = 9;                   ///< laboratory: on the floor, 0 ... 40
   double ground_edges_per_m = 0.35;  ///< edges: lambda of the ground's stripes
   double arena_step_at_s = 10;       ///< arena-step: when the edge moves, after the vehicle first left the ground
+  CityOptions city{};
 };
 
 /// One kind of scene.
@@ -60,17 +72,6 @@ inline constexpr float kArenaStepTakes_s = 0.02f;
 ArenaStep arena_step_of(std::uint32_t seed, double at_s);
 /// The arena with its edge moving so.
 Scene make_arena(std::uint32_t seed, const ArenaStep& step);
-
-/// The low city: boxes on a square grid, each within its own cell.
-struct CityOptions {
-  double length_m = 70, half_width_m = 26;     ///< along x; to either side
-  double free_before_m = 6, free_after_m = 8;  ///< no boxes within these of the ends
-  double pitch_m = 3;                          ///< of the grid; a box fills 72 to 92 % of it each way
-  double mean_low_m = 0.6, mean_high_m = 2;    ///< of the exponential, where the sinusoid is low and high
-  double period_m = 25;                        ///< of the sinusoid along x
-  double lowest_m = 0.3, tallest_m = 4;        ///< heights are cut to these
-  double windowed = 0.3;                       ///< share of boxes with windows
-};
 
 /// The start lies up to 1.5 m north of the edge of the map and up to 8 m to either side, from the seed.
 Scene make_city(std::uint32_t seed, const CityOptions& options);

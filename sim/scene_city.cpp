@@ -17,10 +17,10 @@ constexpr float kBehind_m = -10, kSide_m = 60;
 void add_building(World& world, const Vec3& base, const Vec3& size, const Material& wall, const Material& roof) {
   const Vec3 x(size.x(), 0, 0), y(0, size.y(), 0), up(0, 0, -size.z()), corner = base - x / 2 - y / 2;
   world.add_quad(corner + up, y, x, roof);
-  world.add_quad(corner + up, -up, y, wall);
+  world.add_quad(corner + y + up, -y, -up, wall);
   world.add_quad(corner + x + up, y, -up, wall);
   world.add_quad(corner + up, x, -up, wall);
-  world.add_quad(corner + y + up, -up, x, wall);
+  world.add_quad(corner + x + y + up, -x, -up, wall);
 }
 
 /// Mean of the exponential at x: a sinusoid along the way.
@@ -58,7 +58,5 @@ Scene make_city(std::uint32_t seed, const CityOptions& o) {
   const Vec3 start(static_cast<float>(random.uniform(0, 1.5)), static_cast<float>(random.uniform(-8, 8)), 0);
   return {std::move(world), start, 0, "city"};
 }
-
-Scene make_city(std::uint32_t seed) { return make_city(seed, CityOptions{}); }
 
 }  // namespace wasp::sim

@@ -13,7 +13,6 @@ Scene make_corridor_doorway(std::uint32_t seed);
 Scene make_corridor_obstacles(std::uint32_t seed);
 Scene make_corridor_people(std::uint32_t seed);
 Scene make_office(std::uint32_t seed);
-Scene make_city(std::uint32_t seed);
 Scene make_city_tall(std::uint32_t seed);
 Scene make_wall(std::uint32_t seed);
 Scene make_ground(std::uint32_t seed);

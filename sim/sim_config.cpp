@@ -149,6 +149,9 @@ void add_world_rows(std::vector<Row>& rows) {
       row<int>("world", "cartons", 0, 40, [](D& d) -> int& { return d.config.world.cartons; }),
       row<double>("world", "ground_edges_per_m", 0.02, 20,
           [](D& d) -> double& { return d.config.world.ground_edges_per_m; }),
+      row<double>("world", "city_mean_low_m", 0.05, 50, [](D& d) -> double& { return d.config.world.city.mean_low_m; }),
+      row<double>("world", "city_mean_high_m", 0.05, 50, [](D& d) -> double& { return d.config.world.city.mean_high_m; }),
+      row<double>("world", "city_tallest_m", 0.3, 100, [](D& d) -> double& { return d.config.world.city.tallest_m; }),
       row<double>("world", "arena_step_at_s", 0, 600, [](D& d) -> double& { return d.config.world.arena_step_at_s; }),
   });
   // clang-format on

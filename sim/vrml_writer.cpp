@@ -179,6 +179,7 @@ void write_world(const fs::path& part, const Scene& scene, const fs::path& file)
 void write_vrml(const Scene& scene, const fs::path& file) {
   const World& world = scene.world;
   if (world.quads.empty()) throw std::runtime_error(file.string() + ": the world has no geometry");
+  if (fs::is_directory(file)) throw std::runtime_error(file.string() + ": is a folder");
   UnfinishedFiles files;
   std::set<std::int32_t> textures;
   for (const Surface& surface : world.surfaces) textures.insert(surface.texture);

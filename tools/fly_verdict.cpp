@@ -52,11 +52,27 @@ nlohmann::json run_document(const Run& run, const std::vector<Phase>& phases, co
   return doc;
 }
 
+/// Figures and bars of a mission, from the program that also judges campaigns (missions/judge.h).
+std::vector<Result> judged_by_mission(const Run& run) {
+  const fs::path answer = run.folder / "log/judge.txt";
+  ChildProcess judge({program("wasp-judge"), run.options.mission, run.folder.string(), "--seed",
+                      std::to_string(run.options.seed)},
+                     answer.string());
+  while (!judge.poll()) rt::sleep_until(rt::now() + 10 * kMillisecond);
+  std::vector<Result> results;
+  std::ifstream file(answer);
+  for (std::string line; std::getline(file, line);)
+    if (const auto doc = nlohmann::json::parse(line, nullptr, false); !doc.is_discarded() && doc.is_object())
+      results.push_back(result_from_json(doc));
+  if (results.empty()) results.push_back({"flight judged, see log/judge.txt", 0, "", "== 1", false});
+  return results;
+}
+
 /// What this mission must show beyond being flown to its end.
 std::vector<Result> mission_results(const Run& run, const std::vector<Phase>& phases) {
   if (!run.options.replay.empty()) return {};
   if (run.options.mission == "hover") return hover_results(run.folder / "log", phases);
-  return {};
+  return judged_by_mission(run);
 }
 
 std::vector<Result> judge(const Run& run, int flight_code, const std::vector<Phase>& phases,

@@ -38,8 +38,9 @@ struct Odometry {
     float depth_sigma = 0.01f;        ///< of the depth: this share of it ...
     float depth_sigma_1pm = 0.0015f;  ///< ... and this times its square [1/m] (Kinect: 1.42e-3)
     float min_depth_m = 0.3f, max_depth_m = 8.f;
-    float inlier_sigmas = 10.f;      ///< of the expected error: see FlowMotionParams
-    float turn_sigma_rad = 0.0005f;  ///< of the attitude's turn between two frames, each axis; 0: it is exact
+    float inlier_sigmas = 10.f;  ///< of the expected error: see FlowMotionParams
+    float turn_sigma_rad =
+        0.002f;  ///< of the attitude's turn between two frames, each axis; too large costs nothing measurable
     int min_inliers = 10;
     float min_inlier_share = 0.5f;
     float max_sigma_mps = 0.3f;  ///< less certain is blind

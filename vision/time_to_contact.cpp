@@ -133,10 +133,12 @@ CueBody TimeToContactFront::step(const Params& params, const BehaviourInput& inp
   const FlowMessage& message = *input.flow;
   const TimeNs now_ns = message.exposed_at_ns;
   const FlowFrames frames = frames_of(message, params.camera.R_body_cam);
-  if (!frames.valid || message.derotated == 0 || !(params.frame_s > 0.f)) return cue;
+  if (!frames.valid || !(params.frame_s > 0.f)) return cue;
   if (state.has_last && now_ns < state.last_at_ns) state = State(params);  // another flight
   state.has_last = true;
   state.last_at_ns = now_ns;
+  hold(params, now_ns, false, state, cue);
+  if (message.derotated == 0) return cue;
 
   FlowField ahead;
   view_ahead(params, message, frames, ahead);

@@ -91,7 +91,7 @@ struct TimeToContactFront {
   };
 
   /// Valid when there are cells enough ahead to judge by; a valid cue without avoid means that nothing comes near.
-  /// While avoid is held the flag stands in a blind cue too. Needs the turn from attitude: without, blind.
+  /// Needs the turn from attitude: without, blind. While avoid is held the flag stands in such a blind cue too.
   /// Survives any input. Realtime-safe: yes.
   static CueBody step(const Params& params, const BehaviourInput& input, State& state) WASP_REALTIME;
 };

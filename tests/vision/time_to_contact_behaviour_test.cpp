@@ -109,6 +109,11 @@ TEST(TimeToContactBehaviour, AvoidIsHeldAndThenReleased) {
     raised = T::step(params, input_of(message), state).avoid != 0;
     ASSERT_LT(i, 140);
   }
+  FlowMessage blind = scene.message(at(i, 1.f), at(i, 1.f), i * kFrame + 1);
+  blind.derotated = 0;
+  const CueBody cue = T::step(params, input_of(blind), state);
+  EXPECT_EQ(cue.validity, Validity::kBlind);
+  EXPECT_EQ(cue.avoid, 1);
   int held = 0;  // the vehicle stands still from now on
   for (int k = 0; k < 60; ++k) {
     const FlowMessage message = scene.message(at(i, 1.f), at(i, 1.f), (i + 1 + k) * kFrame, static_cast<unsigned>(k));

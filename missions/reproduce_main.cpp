@@ -1,0 +1,145 @@
+// wasp-reproduce: flies every experiment of the thesis in lockstep, and writes one page with a figure for each of its
+// figures, its result quoted beside ours.
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <iostream>
+#include <stdexcept>
+
+#include "missions/reproduce.h"
+#include "rt/process.h"
+#include "tools/edge_study.h"
+
+namespace {
+
+using namespace wasp;
+using namespace wasp::missions;
+namespace fs = std::filesystem;
+
+struct Options {
+  fs::path out = "out/reproduce";
+  std::vector<std::string> only;
+  std::uint32_t seed = 1;
+  int jobs = 2;
+  bool quick = false;
+};
+
+std::optional<int> parse(int argc, char** argv, Options& o) {
+  CLI::App app{
+      "Flies every experiment of the thesis in lockstep on virtual time and writes OUT/index.html, a CSV and the figures\n"
+      "of each. About an hour on two cores; --quick: a few flights of each, some minutes. Exit code 0: every bar met."};
+  app.name("wasp reproduce");
+  app.option_defaults()->always_capture_default();
+  app.add_option("--out", o.out, "folder to write");
+  app.add_option("--only", o.only, "these missions alone; 'edges': the study of edge statistics");
+  app.add_option("--seed", o.seed, "of each experiment's first flight");
+  app.add_option("--jobs", o.jobs, "threads")->check(CLI::Range(1, 256));
+  app.add_flag("--quick", o.quick, "a few flights of each");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? 0 : 2;
+  }
+  return std::nullopt;
+}
+
+/// One line that is rewritten on a terminal, or printed now and then.
+class ProgressLine {
+ public:
+  explicit ProgressLine(std::string title) : title_(std::move(title)) {}
+  void show(const std::string& text, bool last) {
+    if (terminal_)
+      std::cerr << "\r\033[K" << title_ << ": " << text << (last ? "\n" : "") << std::flush;
+    else if (last)
+      std::cerr << title_ << ": " << text << "\n";
+  }
+
+ private:
+  std::string title_;
+  bool terminal_ = isatty(STDERR_FILENO) != 0;
+};
+
+ExperimentResult fly_experiment(const Experiment& e, const Options& o) {
+  ExperimentResult result;
+  result.experiment = &e;
+  RunFigures figures(e.mission);
+  ProgressLine line(e.mission);
+  CampaignOptions campaign{e.mission, o.quick ? e.quick_runs : e.runs, o.seed, o.jobs, {}};
+  result.campaign = fly_campaign(
+      campaign, [&](const CampaignProgress& p) { line.show(progress_text(p), p.done == p.runs); },
+      [&](std::uint32_t seed, const FlightTrace& trace) { figures.add(seed, trace); });
+  write_csv(result.campaign, o.out / (std::string(e.mission) + ".csv"));
+  figures.write(o.out);
+  for (const Figure& f : figures.figures()) result.figures.emplace_back(f.title, f.plot.svg());
+  return result;
+}
+
+ExperimentResult study_edges(const Options& o) {
+  static const Experiment kEdges{"edges", 0, 0, "Height from edge statistics: three fields of view, lambda swept",
+                                 "figs 7.8 to 7.12",
+                                 "Lambda = 0.35 best estimates the height in the virtual world; a larger field of view "
+                                 "under-estimates height with less variance."};
+  tools::EdgeStudyOptions options;
+  if (o.quick) options.seeds = 3, options.climbs = 2;
+  ProgressLine line("edges");
+  options.progress = [&](int done, int of) { line.show(fmt::format("{} of {} images", done, of), done == of); };
+  const tools::EdgeStudy study = tools::run_edge_study(options);
+  tools::write_edge_study(study, o.out);
+  ExperimentResult result;
+  result.experiment = &kEdges;
+  for (const auto& f : study.fits)
+    result.campaign.results.push_back({fmt::format("RMS height error by height, {} degrees, lambda {:.2f}", f.fov_deg, f.edges_per_m),
+                                       f.rms_share, "", "", true});
+  result.figures = {{"7.8: estimated against true height for several lambda", tools::edge_figure_7_8(study)},
+                    {"7.10: estimated against true height, three fields of view", tools::edge_figure_7_10(study)},
+                    {"7.11: row of most edges against height", tools::edge_figure_7_11(study)}};
+  for (const double fov : options.fovs_deg) {
+    result.figures.emplace_back(fmt::format("7.9: cumulative distribution and model, {} degrees", fov), tools::edge_figure_7_9(study, fov));
+    result.figures.emplace_back(fmt::format("7.12: modelled density, {} degrees", fov), tools::edge_figure_7_12(study, fov));
+  }
+  result.figures.emplace_back("Lambda found from climbs (8.1.3)", tools::edge_figure_lambda(study));
+  return result;
+}
+
+int run(const Options& o) {
+  fs::create_directories(o.out);
+  const auto wanted = [&](const std::string& name) {
+    return o.only.empty() || std::find(o.only.begin(), o.only.end(), name) != o.only.end();
+  };
+  for (const auto& name : o.only)
+    if (name != "edges" && std::none_of(experiments().begin(), experiments().end(), [&](const auto& e) { return name == e.mission; }))
+      throw std::runtime_error("no experiment '" + name + "'");
+  std::vector<ExperimentResult> results;
+  bool ok = true;
+  for (const Experiment& e : experiments()) {
+    if (!wanted(e.mission) || (o.quick && e.quick_runs == 0)) continue;
+    results.push_back(fly_experiment(e, o));
+    for (const auto& r : results.back().campaign.results)
+      if (!r.bar.empty())
+        std::cout << fmt::format("{:<4} {:<16} {:<44} {:>10.4g} {:<5} bar {}\n", r.ok ? "ok" : "MISS", e.mission, r.name, r.value, r.unit, r.bar)
+                  << std::flush;
+    ok = ok && results.back().campaign.passed();
+    if (std::string_view(e.mission) == "edge-height" && wanted("edges")) results.push_back(study_edges(o));
+  }
+  if (o.only == std::vector<std::string>{"edges"}) results.push_back(study_edges(o));
+  std::ofstream page(o.out / "index.html");
+  page << reproduction_page(results, rt::host_description());
+  if (!page.flush()) throw std::runtime_error("cannot write " + (o.out / "index.html").string());
+  std::cout << (ok ? "every bar met" : "BARS MISSED") << "; report: " << (o.out / "index.html").string() << "\n";
+  return ok ? 0 : 1;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Options options;
+  if (const auto code = parse(argc, argv, options)) return *code;
+  try {
+    return run(options);
+  } catch (const std::exception& e) {
+    std::cerr << "wasp reproduce: " << e.what() << "\n";
+    return 2;
+  }
+}
