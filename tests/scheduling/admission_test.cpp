@@ -48,6 +48,16 @@ TEST(Admission, ABehaviourAboveControlThatEatsItsDeadlineIsNamed) {
   EXPECT_NE(plan_text(plan).find("NOT schedulable"), std::string::npos);
 }
 
+TEST(Admission, OnlyEnabledBehavioursCountAtTheRateOfTheirCamera) {
+  Config config = load_config({}, kNames);
+  config.behaviours[0].enabled = false;
+  config.behaviours[1].looks_down = true;
+  config.camera_down.rate_hz = 10;
+  const Plan plan = make_plan(config, kFrame, false, {});
+  EXPECT_EQ(plan.rows.size(), 3u);
+  EXPECT_EQ(row(plan, "edge_altitude").thread.period_ns, 100 * kMillisecond);
+}
+
 TEST(Admission, EnforceRefusesToArmWarnAndOffDoNot) {
   Config config = load_config({}, kNames);
   config.behaviours[1].budget_ns = 60 * kMillisecond;

@@ -4,16 +4,26 @@
 #include <gtest/gtest.h>
 
 #include <unistd.h>
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 
+#include "behaviours.h"
 #include "scheduling/default_config.h"
 
 namespace wasp::scheduling {
 namespace {
 
 const std::vector<std::string> kNames{"ground_altitude", "edge_altitude"};
+
+/// Those with a section in the shipped file, the two above first.
+std::vector<std::string> shipped_names() {
+  std::vector<std::string> names = kNames;
+  for (const auto& row : all_behaviours())
+    if (std::find(names.begin(), names.end(), row.name) == names.end()) names.push_back(row.name);
+  return names;
+}
 
 class ConfigTest : public ::testing::Test {
  protected:
@@ -36,8 +46,9 @@ class ConfigTest : public ::testing::Test {
 };
 
 TEST_F(ConfigTest, ShippedDefaultsLoadAndMatchTheBuiltInOnes) {
-  const Config file = load_config({WASP_SOURCE_DIR "/config/wasp.toml"}, kNames);
-  const Config built_in = load_config({}, kNames);
+  const auto names = shipped_names();
+  const Config file = load_config({WASP_SOURCE_DIR "/config/wasp.toml"}, names);
+  const Config built_in = load_config({}, names);
   EXPECT_EQ(file.control_period_ns, built_in.control_period_ns);
   EXPECT_EQ(file.control_deadline_ns, built_in.control_deadline_ns);
   EXPECT_EQ(file.control.mission.leg_count, built_in.control.mission.leg_count);
@@ -45,14 +56,16 @@ TEST_F(ConfigTest, ShippedDefaultsLoadAndMatchTheBuiltInOnes) {
   EXPECT_FLOAT_EQ(file.control.altitude_hold.mass_kg, built_in.control.altitude_hold.mass_kg);
   EXPECT_EQ(file.control_thread.priority, built_in.control_thread.priority);
   EXPECT_EQ(file.control.link_age_limit_ns, built_in.control.link_age_limit_ns);
-  for (std::size_t i = 0; i < kNames.size(); ++i) {
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    EXPECT_EQ(file.behaviours[i].enabled, i < kNames.size()) << names[i];
+    EXPECT_EQ(file.behaviours[i].enabled, built_in.behaviours[i].enabled);
     EXPECT_EQ(file.control.arbiter.rows[i].height_rank, built_in.control.arbiter.rows[i].height_rank);
     EXPECT_EQ(file.behaviours[i].priority, built_in.behaviours[i].priority);
     TomlTable file_params = file.behaviour_params[i], built_in_params = built_in.behaviour_params[i];
     double a = -1, b = -2;
     file_params.number("edges_per_m", a, 0, 1000);
     built_in_params.number("edges_per_m", b, 0, 1000);
-    if (kNames[i] == "edge_altitude") {
+    if (names[i] == "edge_altitude") {
       EXPECT_EQ(a, b);
     }
   }
@@ -88,10 +101,36 @@ TEST_F(ConfigTest, PoliciesAreReadWhereTheyMakeSense) {
 
 TEST_F(ConfigTest, LaterFilesOverrideSingleKeys) {
   const auto path = write("[control]\ndeadline_us = 7000\n");
-  const Config c = load_config({WASP_SOURCE_DIR "/config/wasp.toml", path}, kNames);
+  const Config c = load_config({WASP_SOURCE_DIR "/config/wasp.toml", path}, shipped_names());
   EXPECT_EQ(c.control_deadline_ns, 7 * kMillisecond);
   EXPECT_EQ(c.control_period_ns, 50 * kMillisecond);
   EXPECT_EQ(c.control.mission.leg_count, 2);
+}
+
+TEST_F(ConfigTest, BehavioursAreSwitchedByTheirSection) {
+  const Config c = load_config({write("[behaviour.edge_altitude]\nenabled = false\n")}, {"edge_altitude", "nobody"});
+  EXPECT_FALSE(c.behaviours[0].enabled);
+  EXPECT_FALSE(c.behaviours[1].enabled);  // no section: not enabled
+  EXPECT_FALSE(error_of("[behaviour.edge_altitude]\nenabled = 1\n").empty());
+}
+
+TEST_F(ConfigTest, TwoCamerasWithLensesOfTheirOwn) {
+  const Config c = load_config({write("[camera]\nk1 = -0.25\n[camera_down]\nenabled = true\nrate_hz = 15\nfx_px = 90\n"
+                                      "fisheye_k = [0.1, 0.0, 0.0, -0.02]\npitch_down_deg = 80\n")},
+                               kNames);
+  EXPECT_EQ(c.camera.lens_kind, LensKind::kPinhole);
+  EXPECT_FLOAT_EQ(c.camera.intrinsics.k1, -0.25f);
+  EXPECT_TRUE(c.camera_down.enabled);
+  EXPECT_EQ(c.camera_down.rate_hz, 15.0);
+  EXPECT_EQ(c.camera_down.geometry.lens_kind, LensKind::kFisheye);
+  EXPECT_FLOAT_EQ(c.camera_down.geometry.intrinsics.fx_px, 90.f);
+  EXPECT_FLOAT_EQ(c.camera_down.geometry.fisheye_k[3], -0.02f);
+  EXPECT_TRUE(c.camera_down.geometry.R_body_cam.isApprox(R_body_cam_from_pitch_down(to_radians(Degrees{80.0}))));
+  const Config shipped = load_config({}, kNames);
+  EXPECT_FALSE(shipped.camera_down.enabled);
+  EXPECT_NE(error_of("[camera]\nlens = \"mirror\"\n").find("fisheye"), std::string::npos);
+  EXPECT_NE(error_of("[camera_down]\nfisheye_k = [1.0]\n").find("fisheye_k"), std::string::npos);
+  EXPECT_NE(error_of("[camera_down]\ndriver = \"sim\"\n").find("driver"), std::string::npos);
 }
 
 TEST_F(ConfigTest, UnknownKeyNamesFileAndLine) {

@@ -47,5 +47,18 @@ TEST_F(ReplayScriptTest, AbsentIsEmptyMalformedNamesTheLine) {
   }
 }
 
+TEST_F(ReplayScriptTest, SpecificForceComesBackToTheBitWhereItWasRecorded) {
+  write("1000,a,7,1,1,0,0,0,0,0,0\n");
+  EXPECT_FALSE(load_replay_script(folder_.string()).at("a")[0].accel_valid);  // older than these columns
+  std::ofstream(folder_ / "cues.csv")
+      << "exposed_at_ns,behaviour,frame_sequence,attitude_valid,q_w,q_x,q_y,q_z,rate_x_body_radps,rate_y_body_radps,"
+         "rate_z_body_radps,accel_valid,accel_x_body_mps2,accel_y_body_mps2,accel_z_body_mps2\n"
+      << "1000,a,7,1,1,0,0,0,0,0,0,1,0.333333343,-0.1,-9.80664921\n1001,a,8,1,1,0,0,0,0,0,0,0,0,0,0\n";
+  const auto script = load_replay_script(folder_.string()).at("a");
+  EXPECT_TRUE(script[0].accel_valid);
+  EXPECT_EQ(script[0].accel_body_mps2, (std::array<float, 3>{0.333333343f, -0.1f, -9.80664921f}));
+  EXPECT_FALSE(script[1].accel_valid);
+}
+
 }  // namespace
 }  // namespace wasp::scheduling
