@@ -41,7 +41,7 @@ Material wall_of(Random& random, const CityOptions& o) {
 /// The boxes of one side are drawn and mirrored; the start is drawn last, so that it changes nothing else.
 Scene make_city(std::uint32_t seed, const CityOptions& o) {
   Random random(mix(seed, 21));
-  World world = empty_world(seed);
+  World world = empty_world(seed, {kSoft, kPlainFacade});
   world.sky = 215;
   world.add_quad({kBehind_m, -kSide_m, 0}, {static_cast<float>(o.length_m) + 40, 0, 0}, {0, 2 * kSide_m, 0},
                  {kSoft, 3.f, 0.9f});

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <initializer_list>
 
 #include "sim/scene.h"
 
@@ -25,7 +26,8 @@ inline constexpr float kCorridorWidth_m = 2.6f, kCorridorHeight_m = 2.6f, kCorri
 /// Index of each texture of these scenes in World::textures; 1 is the renderer's fine grain.
 enum SceneTexture : int { kBlank, kGrain, kNatural, kFacade, kStreet, kWallpaper, kDoor, kNotices, kCarton, kPlainFacade, kSoft, kCloth };
 
-/// A world with these textures and nothing else.
-World empty_world(std::uint32_t seed);
+/// A world with these textures (and kBlank and kGrain) and nothing else. Painting is most of a scene's making, some
+/// 30 ms a texture: the others stay blank.
+World empty_world(std::uint32_t seed, std::initializer_list<SceneTexture> used);
 
 }  // namespace wasp::sim

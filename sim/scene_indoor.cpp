@@ -17,7 +17,8 @@ const Material kPaper{kWallpaper, 2.f, 0.95f}, kFloorMaterial{kNatural, 1.6f, 0.
 /// Builds upright things between points of the floor plan.
 class Builder {
  public:
-  explicit Builder(std::uint32_t seed) : random_(seed), world_(empty_world(seed)) {}
+  explicit Builder(std::uint32_t seed)
+      : random_(seed), world_(empty_world(seed, {kNatural, kWallpaper, kDoor, kNotices, kCarton, kSoft, kCloth})) {}
 
   float between(double low, double high) { return static_cast<float>(random_.uniform(low, high)); }
   World& world() { return world_; }

@@ -34,7 +34,7 @@ std::vector<float> poisson_edges(Random& random, double edges_per_m) {
 /// along the way, 1.5 to 6.5 m; no box is taller than 15 m. The first 10 m are free.
 Scene make_city_tall(std::uint32_t seed) {
   Random random(seed);
-  World world = empty_world(seed);
+  World world = empty_world(seed, {kStreet, kFacade});
   add_ground(world, 300, {kStreet, 4.f, 0.8f});
   const float phase = static_cast<float>(random.uniform()) * kTwoPi;
   for (float x = 10; x < 200; x += 6)
@@ -68,7 +68,7 @@ void add_drum(World& world, float radius_m, float from_m, float to_m, const Mate
 }  // namespace
 
 Scene make_arena(std::uint32_t seed, float edge_height_m) {
-  World world = empty_world(seed);
+  World world = empty_world(seed, {});
   add_ground(world, 8, {kBlank, 1.f, 0.75f});
   const float edge = std::clamp(edge_height_m, 0.f, kArenaHeight_m);
   add_drum(world, kArenaRadius_m, edge, kArenaHeight_m, {kBlank, 1.f, 0.25f});
@@ -88,7 +88,7 @@ ArenaStep arena_step_of(std::uint32_t seed, double at_s) {
 
 /// The upper, dark part hangs just inside the light wall and moves as a whole; its own top stays out of sight.
 Scene make_arena(std::uint32_t seed, const ArenaStep& step) {
-  World world = empty_world(seed);
+  World world = empty_world(seed, {kSoft});
   add_ground(world, 8, {kSoft, 2.f, 1.4f});
   add_drum(world, kArenaRadius_m, 0, kArenaHeight_m, {kSoft, 2.f, 1.3f});
   const auto edge_at = [](float height_m) { return MoverPlace{Vec3(0, 0, -height_m), 0}; };
@@ -104,7 +104,7 @@ Scene make_arena(std::uint32_t seed, const ArenaStep& step) {
 /// The wall's place and angle come from the seed as its texture does.
 Scene make_wall(std::uint32_t seed) {
   Random random(mix(seed, 31));
-  World world = empty_world(seed);
+  World world = empty_world(seed, {kStreet, kNatural});
   add_ground(world, 30, {kStreet, 3.f, 0.7f});
   const auto distance_m = static_cast<float>(random.uniform(6, 8));
   const auto askew = static_cast<float>(random.uniform(-15, 15)) * kTwoPi / 360;
@@ -116,7 +116,7 @@ Scene make_wall(std::uint32_t seed) {
 Scene make_edges(std::uint32_t seed, double edges_per_m) {
   constexpr float kHalfWidth = 300;
   Random random(mix(seed, 41));
-  World world = empty_world(seed);
+  World world = empty_world(seed, {});
   world.make_smooth();
   world.sky = kSky;
   std::vector<float> edges = poisson_edges(random, edges_per_m);
@@ -128,7 +128,7 @@ Scene make_edges(std::uint32_t seed, double edges_per_m) {
 }
 
 Scene make_ground(std::uint32_t seed) {
-  World world = empty_world(seed);
+  World world = empty_world(seed, {kNatural});
   add_ground(world, 40, {kNatural, 2.5f, 1.f});
   return {std::move(world), Vec3::Zero(), 0, "ground"};
 }

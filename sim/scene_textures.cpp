@@ -57,29 +57,51 @@ double notices(double u, double v, std::uint32_t seed) {
              : tone;
 }
 
+Texture paint_scene_texture(SceneTexture which, std::uint32_t s) {
+  switch (which) {
+    case kNatural:
+      return paint(kNaturalSide, [s](double u, double v) { return natural(u, v, s + 1); });
+    case kFacade:
+      return paint(kSide, [s](double u, double v) { return facade(u, v, s + 200); });
+    case kStreet:
+      return paint(kSide, [s](double u, double v) { return 0.15 + 0.7 * natural(u, v, s + 300); });
+    case kWallpaper:
+      return paint(kSide, [s](double u, double v) { return 0.35 + 0.5 * natural(u, v, s + 400); });
+    case kDoor:
+      return paint(kSide, [s](double u, double v) {
+        const bool panel = std::abs(u - 0.5) < 0.32 && (std::abs(v - 0.27) < 0.18 || std::abs(v - 0.72) < 0.2);
+        return (panel ? 0.30 : 0.42) + 0.12 * (tile_noise(u * 0.25, v, 64, s + 500) - 0.5);
+      });
+    case kNotices:
+      return paint(kSide, [s](double u, double v) { return notices(u, v, s + 600); });
+    case kCarton:
+      return paint(kSide, [s](double u, double v) {
+        return (std::abs(u - 0.5) < 0.06 ? 0.75 : 0.5) + 0.25 * (natural(u, v, s + 700) - 0.5);
+      });
+    case kPlainFacade:
+      return paint(kSide, [s](double u, double v) { return few_windows(u, v, s + 800); });
+    case kSoft:
+      return paint(kSide, [s](double u, double v) { return 0.5 + 0.16 * (natural(u, v, s + 900) - 0.5); });
+    case kCloth:
+      return paint(kSide, [s](double u, double v) { return cloth(u, v, s + 950); });
+    case kGrain:
+      return paint_detail();
+    case kBlank:
+      break;
+  }
+  return Texture(1, [](int, int) { return 1.0; });
+}
+
 }  // namespace
 
-World empty_world(std::uint32_t seed) {
-  World w;
-  const std::uint32_t s = seed * 1000;
-  w.textures.push_back(Texture(1, [](int, int) { return 1.0; }));
-  w.textures.push_back(paint_detail());
-  w.textures.push_back(paint(kNaturalSide, [s](double u, double v) { return natural(u, v, s + 1); }));
-  w.textures.push_back(paint(kSide, [s](double u, double v) { return facade(u, v, s + 200); }));
-  w.textures.push_back(paint(kSide, [s](double u, double v) { return 0.15 + 0.7 * natural(u, v, s + 300); }));
-  w.textures.push_back(paint(kSide, [s](double u, double v) { return 0.35 + 0.5 * natural(u, v, s + 400); }));
-  w.textures.push_back(paint(kSide, [s](double u, double v) {
-    const bool panel = std::abs(u - 0.5) < 0.32 && (std::abs(v - 0.27) < 0.18 || std::abs(v - 0.72) < 0.2);
-    return (panel ? 0.30 : 0.42) + 0.12 * (tile_noise(u * 0.25, v, 64, s + 500) - 0.5);
-  }));
-  w.textures.push_back(paint(kSide, [s](double u, double v) { return notices(u, v, s + 600); }));
-  w.textures.push_back(paint(kSide, [s](double u, double v) {
-    return (std::abs(u - 0.5) < 0.06 ? 0.75 : 0.5) + 0.25 * (natural(u, v, s + 700) - 0.5);
-  }));
-  w.textures.push_back(paint(kSide, [s](double u, double v) { return few_windows(u, v, s + 800); }));
-  w.textures.push_back(paint(kSide, [s](double u, double v) { return 0.5 + 0.16 * (natural(u, v, s + 900) - 0.5); }));
-  w.textures.push_back(paint(kSide, [s](double u, double v) { return cloth(u, v, s + 950); }));
-  return w;
+World empty_world(std::uint32_t seed, std::initializer_list<SceneTexture> used) {
+  World world;
+  for (int i = kBlank; i <= kCloth; ++i) {
+    const auto which = static_cast<SceneTexture>(i);
+    const bool needed = which == kGrain || std::find(used.begin(), used.end(), which) != used.end();
+    world.textures.push_back(paint_scene_texture(needed ? which : kBlank, seed * 1000));
+  }
+  return world;
 }
 
 }  // namespace wasp::sim

@@ -76,7 +76,9 @@ void SensorModel::mark_shadows(const float* depth_m) {
   float least = 1e9f;
   for (int u = width_px_ - 1; u >= 0; --u) {
     const auto i = static_cast<std::size_t>(u);
-    const float p = static_cast<float>(u) - projector_px_m_ / std::max(depth_m[u], 0.05f);
+    // Where nothing is hit there is nothing to cast a shadow, nor to be in one.
+    const float disparity_px = depth_m[u] > 0.f ? projector_px_m_ / std::max(depth_m[u], 0.05f) : 0.f;
+    const float p = static_cast<float>(u) - disparity_px;
     seen_[i] = p < least - 0.2f;
     least = std::min(least, p);
   }

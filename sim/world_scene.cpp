@@ -7,6 +7,12 @@
 #include <utility>
 
 namespace wasp::sim {
+namespace {
+
+/// Without it a ray that meets a quad's diagonal to the last bit slips through between its two triangles.
+constexpr RTCSceneFlags kFlags = RTC_SCENE_FLAG_ROBUST;
+
+}  // namespace
 
 WorldScene::WorldScene(World world, RTCDeviceTy* device) : world_(std::move(world)), device_(device) {}
 
@@ -35,8 +41,7 @@ RTCSceneTy* WorldScene::build_faces(std::uint32_t number, std::size_t first, std
   std::memcpy(quads, world_.quads.data() + first, count * sizeof(world_.quads[0]));
   rtcCommitGeometry(geometry);
   RTCScene scene = rtcNewScene(device_);
-  // Without it a ray that meets a quad's diagonal to the last bit slips through between its two triangles.
-  rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
+  rtcSetSceneFlags(scene, kFlags);
   rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_HIGH);
   rtcAttachGeometryByID(scene, geometry, number);
   rtcReleaseGeometry(geometry);
@@ -64,7 +69,7 @@ void WorldScene::build() {
     for (const Mover& mover : world_.movers)
       parts_.push_back(build_faces(static_cast<std::uint32_t>(parts_.size()), mover.first_quad, mover.quad_count));
     scene_ = rtcNewScene(device_);
-    rtcSetSceneFlags(scene_, RTC_SCENE_FLAG_DYNAMIC);
+    rtcSetSceneFlags(scene_, static_cast<RTCSceneFlags>(kFlags | RTC_SCENE_FLAG_DYNAMIC));
     for (RTCScene part : parts_) instances_.push_back(add_instance(part));
     move_to(0);
   }

@@ -33,9 +33,9 @@ float image_motion_rad(const Lens& lens, const FlowField& still) noexcept {
     if (cell.valid == 0 || !direction_of(lens, {cell.x_px, cell.y_px}, a) ||
         !direction_of(lens, {cell.x_px + cell.u_px, cell.y_px + cell.v_px}, b))
       continue;
-    const float chord = (b - a).norm();
-    if (!std::isfinite(chord)) continue;
-    sum += 2.f * std::asin(std::min(0.5f * chord, 1.f)), cells += 1.f;
+    const float angle_rad = 2.f * std::atan2((b - a).norm(), (b + a).norm());
+    if (!std::isfinite(angle_rad)) continue;
+    sum += angle_rad, cells += 1.f;
   }
   return cells > 0.f ? sum / cells : 0.f;
 }

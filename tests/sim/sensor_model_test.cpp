@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 namespace wasp::sim {
@@ -78,6 +79,17 @@ TEST(SensorModel, ANearObjectShadesWhatIsLeftOfItFromTheProjector) {
   EXPECT_EQ(out[290], 0);
   EXPECT_NE(out[260], 0);
   EXPECT_NE(out[405], 0) << "no shadow on the right";
+}
+
+TEST(SensorModel, TheSkyShadesNothing) {
+  SensorModel model({.dropout = 0.f}, kWidth, 525, 1);
+  std::vector<float> truth(kWidth, 2.f);
+  std::fill(truth.begin() + 400, truth.end(), 0.f);  // nothing hit to the right of a wall
+  std::vector<std::uint16_t> out(kWidth);
+  model.depth_row(0, 0, truth.data(), out.data());
+  int seen = 0;
+  for (int u = 0; u < 400; ++u) seen += out[static_cast<std::size_t>(u)] != 0 ? 1 : 0;
+  EXPECT_EQ(seen, 400);
 }
 
 TEST(SensorModel, SameSeedAndFrameSameImageOtherwiseAnother) {

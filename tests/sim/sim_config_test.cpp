@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <fstream>
 #include <sstream>
 
@@ -41,6 +42,52 @@ TEST(SimConfig, SetsWhatItSays) {
   EXPECT_EQ(config.seed, 9u);
   EXPECT_FALSE(config.safety_pilot);
   EXPECT_NEAR((config.camera.R_body_cam * Vec3::UnitZ()).z(), 1, 1e-6) << "looks straight down";
+}
+
+TEST(SimConfig, TheKindOfWorldIsAWordAmongTheKinds) {
+  const SimConfig config = parse_sim_config("[run]\nseed = 5\n[world]\nkind = \"corridor-obstacles\"", "t");
+  EXPECT_EQ(config.world_kind, "corridor-obstacles");
+  EXPECT_EQ(generated_scene(config).title, "corridor-obstacles");
+  const std::string error = error_of("[world]\nkind = \"moon\"");
+  EXPECT_NE(error.find("world.kind"), std::string::npos);
+  for (const SceneKind& kind : scene_kinds()) EXPECT_NE(error.find(kind.name), std::string::npos) << kind.name;
+  EXPECT_NE(error_of("[world]\nkind = 3"), "");
+  EXPECT_EQ(parse_sim_config("", "t").world_kind, "laboratory");
+}
+
+TEST(SimConfig, TheRunsSeedMakesTheWorld) {
+  SimConfig config;
+  config.world_kind = "wall", config.seed = 3;
+  EXPECT_EQ(generated_scene(config).world.vertices_ned_m, make_scene("wall", 3).world.vertices_ned_m);
+}
+
+TEST(SimConfig, APresetSetsVehicleAndCameraAndTheOtherKeysStandWhateverTheirOrder) {
+  const SimConfig gumstix = parse_sim_config("[vehicle]\npreset = \"gumstix\"", "t");
+  EXPECT_EQ(gumstix.vehicle.mass_kg, 0.7);
+  EXPECT_NEAR((gumstix.camera.R_body_cam * Vec3::UnitZ()).z(), 1, 1e-6) << "looks straight down";
+  const SimConfig kontron = parse_sim_config("[vehicle]\npreset = \"kontron\"", "t");
+  EXPECT_EQ(kontron.vehicle.mass_kg, 1.23);
+  EXPECT_NEAR((kontron.camera.R_body_cam * Vec3::UnitZ()).x(), 1, 1e-6) << "looks ahead";
+  const SimConfig kinect = parse_sim_config("[vehicle]\npreset = \"kontron_kinect\"", "t");
+  EXPECT_EQ(kinect.vehicle.mass_kg, SimConfig{}.vehicle.mass_kg);
+  EXPECT_EQ(kinect.vehicle.inertia_kgm2.xx, SimConfig{}.vehicle.inertia_kgm2.xx);
+  EXPECT_TRUE(kinect.camera.R_body_cam.isApprox(SimConfig{}.camera.R_body_cam));
+  const SimConfig both =
+      parse_sim_config("[camera]\npitch_down_deg = 45\n[vehicle]\nmass_kg = 0.9\npreset = \"gumstix\"", "t");
+  EXPECT_EQ(both.vehicle.mass_kg, 0.9);
+  EXPECT_NEAR((both.camera.R_body_cam * Vec3::UnitZ()).z(), std::sqrt(0.5), 1e-6);
+  EXPECT_NE(error_of("[vehicle]\npreset = \"zeppelin\"").find("gumstix"), std::string::npos);
+}
+
+TEST(SimConfig, AnglesOfWindAndStandAreDegreesInTheFileOnly) {
+  const SimConfig config = parse_sim_config(
+      "[wind]\nmean_mps = 2\nmean_direction_deg = 90\n[stand]\nturntable = true\namplitude_degps = 90\n"
+      "profile = \"steps\"",
+      "t");
+  EXPECT_NEAR(config.wind.from_rad, 1.5707963, 1e-6);
+  EXPECT_NEAR(config.stand.amplitude_radps, 1.5707963, 1e-6);
+  EXPECT_EQ(config.stand.profile, StandProfile::kSteps);
+  EXPECT_NE(error_of("[wind]\ngust_time_s = 0"), "");
 }
 
 TEST(SimConfig, LensFocusAndShutterOfEitherCamera) {
@@ -94,6 +141,16 @@ TEST(SimConfig, TheDocumentedFileListsEveryKeyAndHoldsTheDefaults) {
   EXPECT_EQ(file.imu.accel_bias_mps2, defaults.imu.accel_bias_mps2);
   EXPECT_EQ(file.sensor.depth_noise_steps, defaults.sensor.depth_noise_steps);
   EXPECT_EQ(file.clock_offset_s, defaults.clock_offset_s);
+  EXPECT_EQ(file.world_kind, defaults.world_kind);
+  EXPECT_EQ(file.vehicle.mass_kg, defaults.vehicle.mass_kg);
+  EXPECT_EQ(file.pilot.cruise_mps, defaults.pilot.cruise_mps);
+  EXPECT_EQ(file.wind.gust_time_s, defaults.wind.gust_time_s);
+  EXPECT_EQ(file.stand.turntable, defaults.stand.turntable);
+  EXPECT_NEAR(file.stand.amplitude_radps, defaults.stand.amplitude_radps, 1e-3);
+  EXPECT_EQ(file.stand.period_s, defaults.stand.period_s);
+  EXPECT_EQ(file.world.city.tallest_m, defaults.world.city.tallest_m);
+  EXPECT_EQ(file.world.ground_edges_per_m, defaults.world.ground_edges_per_m);
+  EXPECT_EQ(file.world.arena_step_at_s, defaults.world.arena_step_at_s);
   EXPECT_EQ(file.optics.antialias, defaults.optics.antialias);
   EXPECT_FLOAT_EQ(file.optics.field_of_view_rad, defaults.optics.field_of_view_rad);
   EXPECT_EQ(file.optics.aperture_m, defaults.optics.aperture_m);

@@ -54,7 +54,7 @@ class Companion {
 
   Simulator sim;
   Euler attitude;
-  float thrust = 0, wanted_height_m = 1;
+  float thrust = 0, wanted_height_m = 1, hover_thrust = 0.843f;
   bool streaming = false;
   std::map<std::uint32_t, int> count;
   std::vector<mavlink::CommandAck> acks;
@@ -66,7 +66,7 @@ class Companion {
  private:
   void fly() {
     const Truth truth = sim.truth();
-    thrust = 0.843f + 0.1f * (wanted_height_m - truth.height_m) + 0.12f * truth.velocity_ned_mps[2];
+    thrust = hover_thrust + 0.1f * (wanted_height_m - truth.height_m) + 0.12f * truth.velocity_ned_mps[2];
     send_setpoint();
   }
   void listen() {
@@ -210,6 +210,107 @@ TEST(Simulator, SameSeedSameFlight) {
   for (Companion* c : {&a, &b}) c->take_off(1);
   EXPECT_EQ(a.sim.truth().position_ned_m, b.sim.truth().position_ned_m);
   EXPECT_EQ(a.imu.xgyro, b.imu.xgyro);
+}
+
+TEST(Simulator, FlightTimeBeginsWhenItLeavesTheGround) {
+  Companion companion;
+  companion.run(4);
+  EXPECT_EQ(companion.sim.flight_time_s(), 0);
+  companion.take_off(1);
+  const double after_8s = companion.sim.flight_time_s();
+  EXPECT_GT(after_8s, 6.5);
+  EXPECT_LT(after_8s, 8);
+  companion.streaming = false;
+  companion.run(20);
+  EXPECT_NEAR(companion.sim.flight_time_s(), after_8s + 20, 1e-9) << "runs on after the landing";
+  EXPECT_EQ(companion.sim.pose().flight_time_s, companion.sim.flight_time_s());
+}
+
+class Presets : public testing::TestWithParam<VehiclePreset> {};
+
+TEST_P(Presets, HoverAndReachACommandedTilt) {
+  SimConfig config;
+  config.vehicle = GetParam().params();
+  Companion companion(config);
+  companion.hover_thrust = static_cast<float>(config.vehicle.hover_thrust());
+  companion.take_off(1.2f);
+  companion.run(10);
+  EXPECT_NEAR(companion.sim.truth().height_m, 1.2, 0.1);
+  companion.attitude.roll_rad = 6 * kDegree;
+  companion.run(1.5);
+  const auto& q = companion.sim.truth().q_ned_body;
+  EXPECT_NEAR(euler_from_quat({q[0], q[1], q[2], q[3]}).roll_rad / kDegree, 6, 0.6);
+}
+
+INSTANTIATE_TEST_SUITE_P(TableA4, Presets, testing::ValuesIn(kVehiclePresets),
+                         [](const auto& preset) { return std::string(preset.param.name); });
+
+TEST(Simulator, CruisesNorthAtItsSpeedOnItsLineWithItsHeading) {
+  SimConfig config;
+  config.pilot = {.cruise_mps = 1.2, .hold_heading = true};
+  config.wind = {.mean_mps = 1, .from_rad = 1.5707963, .gust_mps = 0.5};
+  Companion companion(config);
+  companion.take_off(1);
+  companion.run(6);
+  const Truth begin = companion.sim.truth();
+  double off_line = 0, off_heading = 0;
+  for (int i = 0; i < 300; ++i) {
+    companion.run(0.1);
+    const Truth truth = companion.sim.truth();
+    off_line = std::max(off_line, std::abs(static_cast<double>(truth.position_ned_m[1])));
+    const auto& q = truth.q_ned_body;
+    off_heading =
+        std::max(off_heading, std::abs(static_cast<double>(euler_from_quat({q[0], q[1], q[2], q[3]}).yaw_rad)));
+    ASSERT_NEAR(truth.height_m, 1, 0.2);
+  }
+  EXPECT_NEAR(companion.sim.truth().position_ned_m[0] - begin.position_ned_m[0], 1.2 * 30, 0.6);
+  EXPECT_LT(off_line, 0.4);
+  EXPECT_LT(off_heading / static_cast<double>(kDegree), 6) << "the compass and gyro are not perfect";
+}
+
+TEST(Simulator, CruiseEndsAfterItsDistanceAndNearTheGround) {
+  SimConfig config;
+  config.pilot = {.cruise_mps = 1.5, .cruise_distance_m = 12};
+  Companion far(config);
+  far.take_off(1);
+  far.run(25);
+  EXPECT_NEAR(far.sim.truth().position_ned_m[0], 12, 0.3);
+  EXPECT_NEAR(far.sim.truth().velocity_ned_mps[0], 0, 0.1);
+  config.pilot.cruise_distance_m = 0;
+  Companion landing(config);
+  landing.take_off(1);
+  landing.run(5);
+  EXPECT_GT(landing.sim.truth().velocity_ned_mps[0], 1.2f);
+  landing.wanted_height_m = 0.22f;
+  landing.run(8);
+  EXPECT_LT(std::abs(landing.sim.truth().velocity_ned_mps[0]), 0.2f);
+}
+
+TEST(Simulator, OnTheTurntableItArmsAndTheGyroFeelsThePlatform) {
+  SimConfig config;
+  config.stand = {.turntable = true, .height_m = 1.5, .amplitude_radps = 0.7, .period_s = 6};
+  Companion companion(config);
+  companion.run(3);
+  companion.command(176, 1, 1);
+  companion.command(400, 1);
+  companion.streaming = true;
+  companion.run(2);
+  EXPECT_EQ(companion.sim.truth().armed, 1.f);
+  EXPECT_NEAR(companion.sim.flight_time_s(), 2, 0.01);
+  double worst = 0, most = 0;
+  for (int i = 0; i < 240; ++i) {
+    companion.run(0.1);
+    const Truth truth = companion.sim.truth();
+    most = std::max(most, static_cast<double>(truth.rate_body_radps[2]));
+    worst = std::max(worst, std::abs(static_cast<double>(companion.imu.zgyro - truth.rate_body_radps[2])));
+    EXPECT_EQ(truth.position_ned_m[2], -1.5f);
+    EXPECT_EQ(truth.armed, 1.f);
+  }
+  EXPECT_NEAR(most, 0.7, 0.01);
+  EXPECT_LT(worst, 0.06) << "bias and noise";
+  const auto& q = companion.sim.truth().q_ned_body;
+  const float true_yaw = euler_from_quat({q[0], q[1], q[2], q[3]}).yaw_rad;
+  EXPECT_LT(std::abs(wrap_angle(companion.sim.flight().euler().yaw_rad - true_yaw)) / kDegree, 8);
 }
 
 TEST(Simulator, NobodyListeningCostsNothing) {

@@ -38,6 +38,18 @@ TEST(VehicleParams, InertiaIsTheSumOfTheRowsAndRotorsMatchTheThesis) {
   EXPECT_NEAR(p.hover_thrust(), 1.925 * 9.81 / 22.4, 1e-9);
 }
 
+TEST(VehicleParams, PresetsAreTheColumnsOfTableA4WithTheRowsOfTableB2) {
+  EXPECT_EQ(kVehiclePresets[0].params().mass_kg, VehicleParams{}.mass_kg);
+  EXPECT_EQ(kVehiclePresets[0].params().inertia_kgm2.yy, VehicleParams{}.inertia_kgm2.yy);
+  const VehicleParams kontron = kVehiclePresets[1].params(), gumstix = kVehiclePresets[2].params();
+  EXPECT_DOUBLE_EQ(kontron.mass_kg, 1.230);
+  EXPECT_NEAR(kontron.inertia_kgm2.xx + kKinectRow.xx, VehicleParams{}.inertia_kgm2.xx, 1e-12);
+  EXPECT_DOUBLE_EQ(gumstix.mass_kg, 0.700);
+  EXPECT_NEAR(kontron.inertia_kgm2.xx - gumstix.inertia_kgm2.xx, 4.36e-3 - 1.01e-3, 1e-12);
+  EXPECT_NEAR(kontron.inertia_kgm2.yy - gumstix.inertia_kgm2.yy, 4.36e-3 - 1.05e-3, 1e-12);
+  EXPECT_NEAR(kontron.inertia_kgm2.zz, gumstix.inertia_kgm2.zz, 1e-12);
+}
+
 TEST(Rotor, ReachesFullSpeedOnTheSupplyAndRespondsInTheRegulatorsTime) {
   const RotorParams params;
   Rotor rotor(params);

@@ -3,8 +3,10 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <sstream>
 
 #include "sim/renderer.h"
 
@@ -62,7 +64,8 @@ TEST_P(EveryKind, LooksTheSameAfterWritingAndReading) {
   EXPECT_NEAR(again.start_yaw_rad, 0.3f, 1e-5f);
   EXPECT_LT((again.start_ned_m - scene.start_ned_m).norm(), 1e-5f);
   EXPECT_NEAR(static_cast<double>(again.world.quads.size()), static_cast<double>(scene.world.quads.size()),
-              0.02 * static_cast<double>(scene.world.quads.size())) << "quads come back as quads, but for slivers";
+              0.02 * static_cast<double>(scene.world.quads.size()))
+      << "quads come back as quads, but for slivers";
   const Picture before = picture_of(scene), after = picture_of(again);
   int different = 0, seen = 0;
   for (std::size_t i = 0; i < before.depth_m.size(); ++i) {
@@ -112,6 +115,132 @@ TEST_F(VrmlFile, ForeignFilesArePlacedLitAndTextured) {
   EXPECT_LT((scene.start_ned_m - Vec3(-5, 0, 0)).norm(), 1e-5f);
   for (const Surface& s : scene.world.surfaces) EXPECT_NEAR(s.brightness, 0.5f * World::lit(s.normal), 1e-5f);
   EXPECT_EQ(scene.world.textures[static_cast<std::size_t>(scene.world.surfaces[0].texture)].size_px(), 2);
+}
+
+/// Where the moving parts' corners are at a time, and nothing else.
+std::vector<Vec3> moving_corners(const World& world, double at_s) {
+  const World still = world.at(at_s);
+  std::vector<Vec3> corners;
+  for (std::size_t quad = world.still_quads(); quad < still.quads.size(); ++quad)
+    for (const std::uint32_t v : still.quads[quad]) corners.push_back(still.vertices_ned_m[v]);
+  const auto before = [](const Vec3& a, const Vec3& b) {
+    for (int i = 0; i < 3; ++i)
+      if (std::abs(a[i] - b[i]) > 1e-3f) return a[i] < b[i];
+    return false;
+  };
+  std::sort(corners.begin(), corners.end(), before);
+  return corners;
+}
+
+TEST_F(VrmlFile, WhatMovesMovesTheSameAfterWritingAndReading) {
+  for (const char* kind : {"arena-step", "corridor-people"}) {
+    const Scene scene = make_scene(kind, 5);
+    write_vrml(scene, folder_ / "moving.wrl");
+    const Scene again = read_vrml(folder_ / "moving.wrl");
+    ASSERT_EQ(again.world.movers.size(), scene.world.movers.size());
+    for (std::size_t i = 0; i < scene.world.movers.size(); ++i) {
+      const Mover &a = scene.world.movers[i], &b = again.world.movers[i];
+      EXPECT_EQ(a.name, b.name);
+      EXPECT_EQ(a.looped, b.looped);
+      EXPECT_EQ(a.quad_count, b.quad_count);
+      ASSERT_EQ(a.keys.size(), b.keys.size());
+      for (std::size_t k = 0; k < a.keys.size(); ++k) EXPECT_NEAR(a.keys[k].at_s, b.keys[k].at_s, 1e-4f);
+    }
+    for (const double t : {0.0, 3.0, 9.99, 10.5, 47.0}) {
+      const std::vector<Vec3> before = moving_corners(scene.world, t), after = moving_corners(again.world, t);
+      ASSERT_EQ(before.size(), after.size());
+      float worst = 0;
+      for (std::size_t c = 0; c < before.size(); ++c) worst = std::max(worst, (before[c] - after[c]).norm());
+      EXPECT_LT(worst, 2e-3f) << kind << " at " << t;
+    }
+  }
+}
+
+constexpr char kRoutes[] = R"(
+    ROUTE Clock.fraction_changed TO Path.set_fraction
+    ROUTE Path.value_changed TO Lift.set_translation
+)";
+
+TEST_F(VrmlFile, AForeignLiftMovesInsideItsScaledAndTurnedParent) {
+  const auto file = text("lift.wrl", std::string(kHead) + R"(
+    Transform { translation 10 0 0 rotation 0 1 0 1.5707963 scale 2 2 2 children
+      DEF Lift Transform { translation 9 9 9 children Shape { geometry Box { size 1 1 1 } } } }
+    Shape { geometry Box { size 1 1 1 } }
+    DEF Clock TimeSensor { cycleInterval 4 loop TRUE }
+    DEF Path PositionInterpolator { key [ 0.5 1 ] keyValue [ 0 0 0, 1 2 0 ] })" +
+                                         kRoutes);
+  const World world = read_vrml(file).world;
+  ASSERT_EQ(world.movers.size(), 1u);
+  EXPECT_EQ(world.movers[0].name, "Lift");
+  EXPECT_TRUE(world.movers[0].looped);
+  EXPECT_EQ(world.still_quads(), 6u);
+  const auto middle = [&](double t) {
+    Vec3 sum = Vec3::Zero();
+    const std::vector<Vec3> corners = moving_corners(world, t);
+    for (const Vec3& c : corners) sum += c / static_cast<float>(corners.size());
+    return sum;
+  };
+  EXPECT_LT((middle(1) - Vec3(0, 10, 0)).norm(), 1e-3f) << "before its first key";
+  EXPECT_LT((middle(3) - Vec3(1, 10, -2)).norm(), 1e-3f) << "half of 2 x (1, 2, 0), x of the lift being north";
+  EXPECT_LT((moving_corners(world, 1).back() - Vec3(1, 11, 1)).norm(), 1e-3f) << "a box of 2 m";
+}
+
+TEST_F(VrmlFile, AMotionThatCannotBeFlownInIsRefusedByName) {
+  const auto lift = [&](const char* clock, const char* path, const char* more = "") {
+    return error_of(text("m.wrl", std::string(kHead) + "DEF Lift Transform { children Shape { geometry Box { } } }\n" +
+                                      "DEF Clock TimeSensor { " + clock + " }\nDEF Path PositionInterpolator { " +
+                                      path + " }\n" + kRoutes + more));
+  };
+  EXPECT_EQ(lift("cycleInterval 2", "key [ 0 1 ] keyValue [ 0 0 0, 1 0 0 ]"), "");
+  for (const std::string& error :
+       {lift("cycleInterval 2", "key [ 0 1 ] keyValue [ 0 0 0 ]"),
+        lift("cycleInterval 2", "key [ 1 0 ] keyValue [ 0 0 0, 1 0 0 ]"),
+        lift("cycleInterval 0", "key [ 0 1 ] keyValue [ 0 0 0, 1 0 0 ]"),
+        lift("cycleInterval 2", "key [ 0 1 ] keyValue [ 0 0 0, 1e9 0 0 ]"),
+        lift("cycleInterval 2", "key [ 0 1 ] keyValue [ 0 0 0, 1 0 0 ]",
+             "DEF Turn OrientationInterpolator { key [ 0 1 ] keyValue [ 0 1 0 0, 1 0 0 1 ] }\n"
+             "ROUTE Clock.fraction_changed TO Turn.set_fraction\nROUTE Turn.value_changed TO Lift.set_rotation\n")}) {
+    EXPECT_NE(error.find("m.wrl"), std::string::npos) << error;
+  }
+  const std::string nested =
+      error_of(text("n.wrl", std::string(kHead) + R"(
+    DEF Lift Transform { children DEF Inner Transform { children Shape { geometry Box { } } } }
+    DEF Clock TimeSensor { } DEF Path PositionInterpolator { key [ 0 1 ] keyValue [ 0 0 0, 1 0 0 ] })" +
+                                 kRoutes + "ROUTE Path.value_changed TO Inner.set_translation\n"));
+  EXPECT_NE(nested.find("within another"), std::string::npos) << nested;
+}
+
+TEST_F(VrmlFile, OrdinaryDamageIsAnErrorThatNamesTheFile) {
+  const std::string png("\x89PNG\r\n\x1a\n\0\0\0", 11);
+  for (const std::string& content :
+       {png, std::string(4096, '\xff'), std::string(kHead) + "Shape { geometry Box {", std::string(kHead) + "}}}}",
+        std::string(kHead) + "ROUTE a.b TO c.d\n", std::string("<X3D></X3D>"),
+        std::string(kHead) + "Shape { geometry IndexedFaceSet { coord Coordinate { point [ 0 0 0 ] } coordIndex [ 0 7 "
+                             "8 -1 ] } }\n"})
+    EXPECT_NE(error_of(text("damaged.wrl", content)).find("damaged.wrl"), std::string::npos) << content.substr(0, 60);
+  write_vrml(make_scene("city", 1), folder_ / "whole.wrl");
+  std::ostringstream whole;
+  whole << std::ifstream(folder_ / "whole.wrl").rdbuf();
+  const std::string cut = error_of(text("damaged.wrl", whole.str().substr(0, whole.str().size() / 2)));
+  EXPECT_NE(cut.find("damaged.wrl"), std::string::npos) << "a file cut off in the middle";
+  EXPECT_NE(cut.find("line"), std::string::npos) << cut;
+}
+
+TEST_F(VrmlFile, NothingIsLeftOfAWorldWhoseLastFileFails) {
+  fs::create_directories(folder_ / "w.wrl.part" / "in the way");
+  EXPECT_THROW(write_vrml(make_scene("wall", 1), folder_ / "w.wrl"), std::runtime_error);
+  fs::create_directories(folder_ / "v.wrl" / "in the way");
+  EXPECT_THROW(write_vrml(make_scene("wall", 1), folder_ / "v.wrl"), std::runtime_error);
+  int entries = 0;
+  for ([[maybe_unused]] const auto& entry : fs::directory_iterator(folder_)) ++entries;
+  EXPECT_EQ(entries, 2) << "textures are gone again";
+}
+
+TEST_F(VrmlFile, ASmoothWorldComesBackSmooth) {
+  write_vrml(make_scene("edges", 2), folder_ / "edges.wrl");
+  EXPECT_TRUE(read_vrml(folder_ / "edges.wrl").world.smooth);
+  write_vrml(make_scene("ground", 2), folder_ / "ground.wrl");
+  EXPECT_FALSE(read_vrml(folder_ / "ground.wrl").world.smooth);
 }
 
 TEST_F(VrmlFile, WhatIsNoWorldIsSaidByFileAndReason) {

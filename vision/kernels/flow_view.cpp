@@ -41,8 +41,9 @@ void view_flow(const Lens& lens, const FlowField& in, const FlowView& view, Flow
 }
 
 Mat3 R_level_body_of(const std::array<float, 4>& q) noexcept {
-  const Euler e = euler_from_quat(Quat(q[0], q[1], q[2], q[3]).normalized());
-  return quat_from_euler({e.roll_rad, e.pitch_rad, 0.f}).toRotationMatrix();
+  const Mat3 R_ned_body = Quat(q[0], q[1], q[2], q[3]).normalized().toRotationMatrix();
+  const float yaw_rad = std::atan2(R_ned_body(1, 0), R_ned_body(0, 0));
+  return Eigen::AngleAxisf(-yaw_rad, Vec3::UnitZ()).toRotationMatrix() * R_ned_body;
 }
 
 FlowFrames frames_of(const FlowMessage& message, const Mat3& R_body_cam) noexcept {
