@@ -114,7 +114,11 @@ void write_flight_config(const fs::path& path, const fs::path& tty, bool enforce
 TEST(Fly, RecordsReportsAndItsReplayGivesTheSameCuesToTheBit) {
   TemporaryFolder out;
   const std::string name = unique("rec"), again = unique("rep");
-  const auto [text, code] = run_shell(fly(out, name, "--seconds 5 --record --json"));
+  const fs::path config = out.path / "flow.toml";  // a flow field and two who read it, beside the two that always fly
+  std::ofstream(config) << "[behaviour.flow_field]\nenabled = true\n[behaviour.odometry]\nenabled = true\n"
+                           "[behaviour.time_to_contact]\nenabled = true\n";
+  const std::string with_flow = " --config " + config.string();
+  const auto [text, code] = run_shell(fly(out, name, "--seconds 5 --record --json" + with_flow));
   const fs::path run = out.path / name;
   ASSERT_TRUE(fs::exists(run / "report.html")) << text;
   EXPECT_NE(read_text(run / "report.html").find("<svg"), std::string::npos);
@@ -133,8 +137,9 @@ TEST(Fly, RecordsReportsAndItsReplayGivesTheSameCuesToTheBit) {
 
   const auto live = cue_bodies(run / "recording/cues.csv");
   ASSERT_GT(live.size(), 50u);
+  EXPECT_TRUE(std::ranges::any_of(live, [](const auto& cue) { return cue.first.starts_with("time_to_contact#"); }));
   const auto lost = nlohmann::json::parse(read_text(run / "log/record.json"));
-  run_shell(fly(out, again, "--replay " + (run / "recording").string()));
+  run_shell(fly(out, again, "--replay " + (run / "recording").string() + with_flow));
   const auto replayed = cue_bodies(out.path / again / "log/cues.csv");
   // What the recorder lost (it says so) cannot be replayed; without loss every cue must come back to the bit.
   std::uint64_t lost_count = 0;
@@ -247,7 +252,7 @@ void expect_refusal(const std::string& command, const std::string& word) {
 TEST(FlyRefuses, WhatCannotBeFlown) {
   TemporaryFolder out;
   expect_refusal(fly(out, "a", "--replay /nowhere/at/all"), "/nowhere/at/all");
-  expect_refusal(fly(out, "a", "--mission teleport"), "teleport");
+  expect_refusal(fly(out, "a", "--mission teleport"), "unknown mission 'teleport'; known: ");
   expect_refusal(fly(out, "a/../b", ""), "--name");
   expect_refusal(fly(out, "a", "--seconds -3"), "--seconds");
   expect_refusal(kWasp + " dance 2>&1", "dance");
@@ -263,6 +268,15 @@ TEST(FlyRefuses, AConfigurationWithAnUnknownKeyOrAnImpossibleValue) {
   expect_refusal(fly(out, unique("bad3"), "--seconds 2 --config " + config.string()), "edges_per_mile");
   std::ofstream(config) << "[threads.control]\npriority = 400\n";
   expect_refusal(fly(out, unique("bad2"), "--seconds 2 --config " + config.string()), "400");
+}
+
+TEST(FlyRefuses, BehavioursThatCannotHaveTheirStream) {
+  TemporaryFolder out;
+  const fs::path config = out.path / "c.toml";
+  std::ofstream(config) << "[behaviour.odometry]\nenabled = true\n";
+  expect_refusal(fly(out, unique("flowless"), "--seconds 2 --config " + config.string()), "'flow_field'");
+  std::ofstream(config) << "[behaviour.flow_field_down]\nenabled = true\n";  // hover has no camera that looks down
+  expect_refusal(fly(out, unique("downless"), "--seconds 2 --config " + config.string()), "[camera_down]");
 }
 
 TEST(FlyRefuses, ToOverwriteAnEarlierRun) {

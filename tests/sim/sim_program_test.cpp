@@ -5,6 +5,7 @@
 
 #include <cstring>
 #include <filesystem>
+#include <fstream>
 
 #include "messages/mavlink_frame.h"
 #include "rt/clock.h"
@@ -68,25 +69,58 @@ TEST(SimProgram, PublishesBothImagesOfAnExposureAndTheTruth) {
       truth(truth_region, shm::kTruth, "Truth");
   TimeNs last_ns = 0;
   for (int i = 0; i < 5; ++i) {
-    ASSERT_TRUE(depth.wait(rt::now() + 20 * kSecond));
-    const shm::Sample d = depth.next();
-    ASSERT_TRUE(d);
-    const FrameHeader h = header_of(d);
-    EXPECT_EQ(h.format, PixelFormat::kDepth16Mm);
-    EXPECT_EQ(h.stride_bytes, 1280u);
+    ASSERT_TRUE(gray.wait(rt::now() + 20 * kSecond));
+    const shm::Sample g = gray.next();
+    ASSERT_TRUE(g);
+    const FrameHeader h = header_of(g);
+    EXPECT_EQ(h.format, PixelFormat::kMono8);
+    EXPECT_EQ(h.stride_bytes, 640u);
     EXPECT_GT(h.exposed_at_ns, last_ns);
-    EXPECT_GT(d.published_at_ns, h.exposed_at_ns);
+    EXPECT_GT(g.published_at_ns, h.exposed_at_ns);
     last_ns = h.exposed_at_ns;
-    bool paired = false;
-    for (std::uint64_t n = 1; n <= gray.newest(); ++n)
-      if (const shm::Sample g = gray.look(n); g && header_of(g).sequence == h.sequence)
-        paired = header_of(g).exposed_at_ns == h.exposed_at_ns;
+    bool paired = false;  // depth comes first: it is there already
+    for (std::uint64_t n = 1; n <= depth.newest(); ++n)
+      if (const shm::Sample d = depth.look(n); d && header_of(d).sequence == h.sequence) {
+        EXPECT_EQ(header_of(d).format, PixelFormat::kDepth16Mm);
+        EXPECT_EQ(header_of(d).stride_bytes, 1280u);
+        paired = header_of(d).exposed_at_ns == h.exposed_at_ns;
+      }
     EXPECT_TRUE(paired);
   }
+  EXPECT_FALSE(camera.has(shm::kGrayDown));
   Truth newest;
   ASSERT_TRUE(truth.copy_newest(newest));
   EXPECT_NEAR(newest.height_m, 0.2f, 0.01f);
   EXPECT_EQ(newest.armed, 0.f);
+}
+
+TEST(SimProgram, ASecondCameraIsShownBesideTheFirst) {
+  const std::string config = testing::TempDir() + test::unique_name("down") + ".toml";
+  std::ofstream(config) << "[camera]\nwidth_px = 64\nheight_px = 48\n[camera_down]\nenabled = true\nrate_hz = 20.0\n"
+                           "width_px = 96\nheight_px = 64\n";
+  Program program({"--config", config});
+  ASSERT_TRUE(program.ready());
+  const auto camera = shm::Region::attach_with_bells(shm::camera_region(program.instance));
+  shm::RingReader front(camera, shm::kGray, "Frame"), down(camera, shm::kGrayDown, "Frame");
+  std::uint32_t last_sequence = 0;
+  TimeNs last_ns = 0;
+  for (int i = 0; i < 6; ++i) {
+    ASSERT_TRUE(down.wait(rt::now() + 20 * kSecond));
+    const shm::Sample sample = down.next();
+    ASSERT_TRUE(sample);
+    const FrameHeader h = header_of(sample);
+    EXPECT_EQ(h.format, PixelFormat::kMono8);
+    EXPECT_EQ(h.width_px, 96u);
+    EXPECT_EQ(h.height_px, 64u);
+    if (i > 0) {
+      EXPECT_EQ(h.exposed_at_ns - last_ns, (h.sequence - last_sequence) * 50 * kMillisecond);
+    }
+    last_ns = h.exposed_at_ns;
+    last_sequence = h.sequence;
+  }
+  ASSERT_TRUE(front.wait(rt::now() + 20 * kSecond));
+  EXPECT_EQ(header_of(front.next()).width_px, 64u);
+  std::filesystem::remove(config);
 }
 
 TEST(SimProgram, SpeaksMavlinkOnTheLineAndItSurvivesReopening) {

@@ -239,8 +239,10 @@ TEST_F(Record, FlowFieldsAndTheSecondCameraAreNotKeptAndMakeNoNoise) {
   shm::Region::remove(c.name());
   const auto document = account(out_);
   for (const auto& t : document["topics"]) EXPECT_FALSE(t["kept"].get<bool>()) << t;
-  ASSERT_EQ(document["events"].size(), 1u) << document["events"];
-  EXPECT_NE(document["events"][0]["what"].get<std::string>().find("Riddle"), std::string::npos);
+  std::string unknown;
+  for (const auto& event : document["events"])
+    if (const std::string what = event["what"]; what.find("unknown type") != std::string::npos) unknown += what;
+  EXPECT_EQ(unknown, "topic 'riddle' of unknown type 'Riddle' is not recorded");
 }
 
 TEST_F(Record, GarbageUnderTheNameIsAnEvent) {
