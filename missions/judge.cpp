@@ -25,12 +25,12 @@ std::vector<Bar> yaw_bars(double correlation) {
 }
 
 std::vector<Bar> city_bars() {
-  return {no_collision(),
+  return {flown(), no_collision(),
           {"least distance to a box", Over::kWorstLow, "m", kAtLeast, kNone},
           {"mean height over obstacles", Over::kMean, "m", kAtMost, kNone},
           {"mean height", Over::kMean, "m", kAtMost, kNone},
           {"overshoot above the setpoint", Over::kWorstHigh, "m", kAtMost, kNone},
-          {"way flown", Over::kWorstLow, "m", kAtLeast, kNone}};
+          {"way flown", Over::kWorstLow, "m", kAtLeast, 60}};
 }
 
 const std::vector<Judge>& judges() {
@@ -40,18 +40,18 @@ const std::vector<Judge>& judges() {
       {"turntable", &measure_yaw, yaw_bars(0.98)},
       {"hover-yaw", &measure_yaw, yaw_bars(0.95)},
       {"aggressive", &measure_yaw, yaw_bars(0.90)},
-      {"wall", &measure_wall, {no_collision(),
+      {"wall", &measure_wall, {flown(), no_collision(),
                                {"frames from avoid to impact", Over::kWorstLow, "", kAtLeast, 15},
                                {"closest approach", Over::kWorstLow, "m", kAtLeast, kNone}}},
-      {"corridor-empty", &measure_corridor, {no_collision(),
+      {"corridor-empty", &measure_corridor, {flown(), no_collision(),
                                              {"false avoids", Over::kSum, "", kAtMost, 0},
                                              {"lateral RMS by width", Over::kWorstHigh, "", kAtMost, 0.10},
                                              {"way flown", Over::kWorstLow, "m", kAtLeast, 20}}},
-      {"corridor", &measure_corridor, {{"collisions", Over::kMean, "", kAtMost, 0.01},
+      {"corridor", &measure_corridor, {flown(), {"collisions", Over::kMean, "", kAtMost, 0.01},
                                        {"least distance", Over::kWorstLow, "m", kAtLeast, kNone},
                                        {"lateral RMS by width", Over::kMean, "", kAtMost, kNone},
-                                       {"way flown", Over::kWorstLow, "m", kAtLeast, kNone}}},
-      {"arena", &measure_arena, {{"height follows the edge", Over::kWorstLow, "", kAtLeast, 1},
+                                       {"way flown", Over::kWorstLow, "m", kAtLeast, 20}}},
+      {"arena", &measure_arena, {flown(), {"height follows the edge", Over::kWorstLow, "", kAtLeast, 1},
                                  {"share of the step followed", Over::kWorstLow, "", kAtLeast, kNone},
                                  {"time to follow half the step", Over::kWorstHigh, "s", kAtMost, kNone}}},
       {"city-max", &measure_city, city_bars()},

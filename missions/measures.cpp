@@ -162,7 +162,8 @@ Measures measure_wall(const FlightTrace& trace, const MissionSetup& setup, World
     break;
   }
   const Nearest near = nearest_along(trace, probe, 0);
-  return {{"collisions", near.first_hit_ns != kNever ? 1 : 0},
+  return {{"flown to its end", flown_to_its_end(trace)},
+          {"collisions", near.first_hit_ns != kNever ? 1 : 0},
           {"frames from avoid to impact", frames},
           {"speed at avoid", speed},
           {"closest approach", near.around_m}};
@@ -176,7 +177,8 @@ Measures measure_corridor(const FlightTrace& trace, const MissionSetup&, WorldPr
     way_m = std::max(way_m, north_m(*t));
     if (north_m(*t) > 4) lateral.push_back(east_m(*t));
   }
-  return {{"collisions", near.first_hit_ns != kNever ? 1 : 0},
+  return {{"flown to its end", flown_to_its_end(trace)},
+          {"collisions", near.first_hit_ns != kNever ? 1 : 0},
           {"false avoids", avoids_raised(trace)},
           {"least distance", near.around_m},
           {"lateral RMS by width", rms(lateral) / static_cast<double>(sim::kCorridorWidth_m)},
@@ -207,7 +209,8 @@ Measures measure_arena(const FlightTrace& trace, const MissionSetup& setup, Worl
     half_s = s - at_s;
     break;
   }
-  return {{"height follows the edge", share > 0.7 && share < 1.3 ? 1 : 0},
+  return {{"flown to its end", flown_to_its_end(trace)},
+          {"height follows the edge", share > 0.7 && share < 1.3 ? 1 : 0},
           {"share of the step followed", share},
           {"time to follow half the step", half_s},
           {"edge step", edge_m},
@@ -227,7 +230,8 @@ Measures measure_city(const FlightTrace& trace, const MissionSetup&, WorldProbe&
   for (const Command& c : trace.commands)
     if (c.height_setpoint_m > 0 && trace.seconds(c.due_at_ns) > 3 && c.mission_phase < 20)
       overshoot = std::max(overshoot, height_m(trace.truth_at(c.due_at_ns)) - static_cast<double>(c.height_setpoint_m));
-  return {{"collisions", near.first_hit_ns != kNever ? 1 : 0},
+  return {{"flown to its end", flown_to_its_end(trace)},
+          {"collisions", near.first_hit_ns != kNever ? 1 : 0},
           {"least distance to a box", near.around_m},
           {"mean height over obstacles", near.looks > 0 ? near.over_sum_m / near.looks : kNone},
           {"mean height", n > 0 ? height_sum / n : kNone},
