@@ -18,6 +18,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
+/// A field of a CSV in quotes.
+std::string quoted(const std::string& text) {
+  std::string out = "\"";
+  for (const char c : text) out += c == '"' ? "\"\"" : std::string(1, c);
+  return out + "\"";
+}
+
 std::string duration_text(double s) {
   return s < 90 ? fmt::format("{:.0f} s", s) : s < 5400 ? fmt::format("{:.0f} min", s / 60) : fmt::format("{:.1f} h", s / 3600);
 }
@@ -101,13 +108,13 @@ void write_csv(const CampaignResult& result, const fs::path& file) {
   for (const CampaignRun& r : result.runs)
     if (r.error.empty() && columns == nullptr) columns = &r.measures;
   if (columns != nullptr)
-    for (const auto& [name, value] : *columns) out << ',' << fmt::format("\"{}\"", name);
+    for (const auto& [name, value] : *columns) out << ',' << quoted(name);
   out << ",error\n";
   for (const CampaignRun& r : result.runs) {
     out << fmt::format("{},{:.3f},{:.3f}", r.seed, r.flight_s, r.wall_s);
     if (columns != nullptr)
       for (const auto& [name, value] : *columns) out << fmt::format(",{:.6g}", value_of(r.measures, name));
-    out << fmt::format(",\"{}\"\n", r.error);
+    out << ',' << quoted(r.error) << '\n';
   }
   out.close();
   if (!out) {

@@ -7,6 +7,7 @@
 #include "control/mission.h"
 #include "sim/scene_generators.h"
 #include "tools/quantiles.h"
+#include "vision/edge_altitude.h"
 #include "vision/heading_rate.h"
 
 namespace wasp::missions {
@@ -234,16 +235,26 @@ Measures measure_city(const FlightTrace& trace, const MissionSetup&, WorldProbe&
           {"way flown", way_m}};
 }
 
-Measures measure_edge_height(const FlightTrace& trace, const MissionSetup&, WorldProbe&) {
-  std::vector<double> error, lambda;
+Measures measure_edge_height(const FlightTrace& trace, const MissionSetup& setup, WorldProbe&) {
+  using Detail = vision::EdgeAltitude::Detail;
+  std::vector<double> error;
+  double lambda = kNone, sigma = kNone;
+  int estimates = 0;
   for (const Cue& c : trace.of("edge_altitude")) {
-    if (c.body.validity != Validity::kValid || c.body.has_height == 0) continue;
+    const auto now = static_cast<double>(c.body.detail[Detail::kEdgesPerMSigma]);
+    if (now > 0) {
+      estimates += now != sigma ? 1 : 0;
+      lambda = static_cast<double>(c.body.detail[Detail::kEdgesPerM]), sigma = now;
+    }
+    if (c.body.validity != Validity::kValid || c.body.has_height == 0 || !(sigma > 0)) continue;
     const double truth_m = height_m(trace.truth_at(c.exposed_at_ns));
     error.push_back(std::fabs(static_cast<double>(c.body.height_m) - truth_m) / truth_m);
   }
-  std::vector<double> last(error.size() > 300 ? error.end() - 300 : error.begin(), error.end());
   return {{"flown to its end", flown_to_its_end(trace)},
-          {"mean height error, lambda estimated", last.empty() ? kNone : tools::median(last)}};
+          {"lambda estimated", lambda},
+          {"its sigma", sigma},
+          {"lambda of the ground", setup.sim.world.ground_edges_per_m},
+          {"height error once lambda is known, median share", error.empty() ? kNone : tools::median(error)}};
 }
 
 Measures measure_landing(const FlightTrace& trace, const MissionSetup&, WorldProbe&) {
