@@ -107,7 +107,7 @@ float wish(const EdgePeak::Params& p, bool near, float asked_mps, TimeNs now_ns,
   if (near) state.near_at_ns = now_ns;
   if (!near && since(state.near_at_ns, now_ns, age_s) && age_s < static_cast<double>(p.hold_s))
     climb_mps = std::max(climb_mps, 0.f);
-  state.climb_mps = std::clamp(climb_mps, -p.max_sink_mps, p.max_climb_mps);
+  state.climb_mps = std::clamp(climb_mps, near ? -p.max_sink_mps : -p.idle_sink_mps, p.max_climb_mps);
   state.wished_at_ns = now_ns;
   return state.climb_mps;
 }
@@ -115,7 +115,8 @@ float wish(const EdgePeak::Params& p, bool near, float asked_mps, TimeNs now_ns,
 bool fits(const EdgePeak::Params& p, const GrayView& gray) noexcept {
   const Intrinsics& k = p.camera.intrinsics;
   return usable(k) && gray.valid() && gray.width_px == k.width_px && gray.height_px == k.height_px &&
-         std::isfinite(p.gain_mps_rad + p.idle_sink_mps) && p.max_sink_mps >= 0.f && p.max_climb_mps >= 0.f;
+         std::isfinite(p.gain_mps_rad + p.idle_sink_mps) && p.max_sink_mps >= 0.f && p.idle_sink_mps >= 0.f &&
+         p.max_climb_mps >= 0.f;
 }
 
 std::optional<EmdGrid> detectors(const EdgePeak::Params& p) {

@@ -41,18 +41,19 @@ struct EdgePeak {
     int mode = 1;                  ///< EdgePeakMode
     float max_depth_m = 3.f;       ///< D_max of (7.41)
     int min_threshold = 24;        ///< Sobel units: least gradient of an edge, modes 0 and 1
-    int fixed_threshold = 0;       ///< Sobel units: gradient of an edge in modes 0 and 1 instead of the RMS; 0: the RMS
+    int fixed_threshold = 40;      ///< Sobel units: gradient of an edge in modes 0 and 1; 0: the RMS, as (7.33). A
+                                   ///< plain wall close by has weak edges only, and the skyline sets the RMS
     int sharp_threshold = 160;     ///< Sobel units: gradient of an edge in mode 2
     int emd_pitch_px = 4;          ///< between the motion detectors' receptors, mode 3
     float emd_min_response = 4.f;  ///< least response of one that fires [grey^2], mode 3
-    float setpoint_rad = 0.f;  ///< of m_s below the horizon; 0: half-way down the lower half of a level camera's image
-    float share = 0.5f;        ///< m_p is the topmost row with this share of the largest count; 1: the thesis' arg max
-    int window_rows = 9;       ///< of the sliding mean
-    float centre_share = 1.f;  ///< of the image's width, about its middle: what lies beside the way may be left out
-    int min_edges = 60;        ///< fewer edge pixels (mode 3: detectors): nothing is near
-    float gain_mps_rad = 3.f;  ///< climb rate for one radian of Delta, k_i
-    float max_climb_mps = 1.f, max_sink_mps = 0.4f;
-    float idle_sink_mps = 0.2f;  ///< sinks so where nothing is near
+    float setpoint_rad = 0.f;   ///< of m_s below the horizon; 0: half-way down the lower half of a level camera's image
+    float share = 0.1f;         ///< m_p is the topmost row with this share of the largest count; 1: the thesis' arg max
+    int window_rows = 9;        ///< of the sliding mean
+    float centre_share = 0.6f;  ///< of the image's width, about its middle: what lies beside the way is left out
+    int min_edges = 60;         ///< fewer edge pixels (mode 3: detectors): nothing is near
+    float gain_mps_rad = 4.f;   ///< climb rate for one radian of Delta, k_i
+    float max_climb_mps = 1.f, max_sink_mps = 0.2f;
+    float idle_sink_mps = 0.4f;  ///< sinks so where nothing is near
     float release_s = 1.f;       ///< a wish to climb fades no faster than with this time constant
     float hold_s = 1.5f;         ///< after the last near edge it does not sink for this long
   };

@@ -24,6 +24,8 @@ EdgePeak::Params params_of(EdgePeakMode mode) {
       .width_px = kWidth, .height_px = kHeight, .fx_px = kFocal, .fy_px = kFocal, .cx_px = 159.5f, .cy_px = 119.5f};
   p.mode = static_cast<int>(mode);
   p.release_s = p.hold_s = 0.f;
+  p.share = 0.5f;
+  p.centre_share = 1.f;
   return p;
 }
 
