@@ -42,7 +42,7 @@ bool CampaignResult::passed() const {
          std::all_of(runs.begin(), runs.end(), [](const auto& r) { return r.error.empty(); });
 }
 
-CampaignRun fly_once(const MissionSetup& setup, const std::function<void(const FlightTrace&)>& look) {
+CampaignRun fly_once(const MissionSetup& setup, const FlightLook& look) {
   CampaignRun run;
   run.seed = setup.sim.seed;
   const TimeNs began_ns = rt::now();
@@ -50,17 +50,15 @@ CampaignRun fly_once(const MissionSetup& setup, const std::function<void(const F
   const FlightTrace trace =
       trace_of(flight.fly(setup.limit_s()), scheduling::names_of(all_behaviours()));
   run.flight_s = to_seconds(trace.truth.back().exposed_at_ns);
-  if (look) look(trace);
-  if (const Judge* judge = judge_of(setup.name)) {
-    WorldProbe probe(setup);
-    run.measures = judge->measure(trace, setup, probe);
-  }
+  WorldProbe probe(setup);
+  if (look) look(trace, probe);
+  run.measures = judge_of(setup.name).measure(trace, setup, probe);
   run.wall_s = to_seconds(rt::now() - began_ns);
   return run;
 }
 
 CampaignResult fly_campaign(const CampaignOptions& options, const std::function<void(const CampaignProgress&)>& on_progress,
-                            const std::function<void(std::uint32_t, const FlightTrace&)>& keep) {
+                            const FlightKeep& keep) {
   (void)load_mission(options.mission, options.first_seed, options.configs);  // errors before any thread
   CampaignResult result{options, std::vector<CampaignRun>(static_cast<std::size_t>(options.runs)), 0, {}};
   const TimeNs began_ns = rt::now();
@@ -72,10 +70,10 @@ CampaignResult fly_campaign(const CampaignOptions& options, const std::function<
       const std::uint32_t seed = options.first_seed + static_cast<std::uint32_t>(i);
       CampaignRun& run = result.runs[static_cast<std::size_t>(i)];
       try {
-        run = fly_once(load_mission(options.mission, seed, options.configs), [&](const FlightTrace& trace) {
+        run = fly_once(load_mission(options.mission, seed, options.configs), [&](const FlightTrace& trace, const WorldProbe& probe) {
           if (!keep) return;
           const std::lock_guard lock(mutex);
-          keep(seed, trace);
+          keep(seed, trace, probe);
         });
       } catch (const std::exception& e) {
         run.seed = seed;
@@ -96,7 +94,7 @@ CampaignResult fly_campaign(const CampaignOptions& options, const std::function<
   result.wall_s = to_seconds(rt::now() - began_ns);
   std::vector<Measures> measures;
   for (const CampaignRun& r : result.runs) measures.push_back(r.measures);
-  if (const Judge* judge = judge_of(options.mission)) result.results = verdict(*judge, measures);
+  result.results = verdict(judge_of(options.mission), measures);
   return result;
 }
 

@@ -79,8 +79,8 @@ int run(const Options& o) {
     std::cerr << (terminal ? "\r\033[K" : "") << progress_text(p) << (terminal && p.done < p.runs ? "" : "\n") << std::flush;
   };
   RunFigures figures(o.campaign.mission);
-  const CampaignResult result = fly_campaign(o.campaign, progress, [&](std::uint32_t seed, const FlightTrace& trace) {
-    if (!o.out.empty()) figures.add(seed, trace);
+  const CampaignResult result = fly_campaign(o.campaign, progress, [&](std::uint32_t seed, const FlightTrace& trace, const WorldProbe& probe) {
+    if (!o.out.empty()) figures.add(seed, trace, probe);
     if (!o.out.empty() && o.only_seed) write_trace_csv(trace, o.out / fmt::format("trace-{}.csv", seed));
   });
   print_results(result, o.json);

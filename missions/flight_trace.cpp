@@ -18,8 +18,6 @@ namespace {
 namespace fs = std::filesystem;
 using tools::CsvTable;
 
-constexpr float kLiftOff_m = 0.03f;  ///< above where it stood
-
 /// Columns of a table, read once; absent ones give 0.
 class Columns {
  public:
@@ -69,6 +67,7 @@ std::vector<Truth> read_truth(const fs::path& file) {
   c.array("rate_", kXyzRate, rows, [](Truth& t) -> auto& { return t.rate_body_radps; });
   c.number("height_m", rows, [](Truth& t) -> float& { return t.height_m; });
   c.number("armed", rows, [](Truth& t) -> float& { return t.armed; });
+  c.number("flight_time_s", rows, [](Truth& t) -> float& { return t.flight_time_s; });
   return rows;
 }
 
@@ -140,9 +139,9 @@ void finish(FlightTrace& trace) {
   for (auto& [name, cues] : trace.cues)
     std::stable_sort(cues.begin(), cues.end(), [](const Cue& a, const Cue& b) { return a.exposed_at_ns < b.exposed_at_ns; });
   if (trace.truth.empty()) throw std::runtime_error("the flight has no truth");
-  const float stood_m = -trace.truth.front().position_ned_m[2];
   for (const Truth& t : trace.truth)
-    if (trace.lift_off_ns == kNever && -t.position_ned_m[2] > stood_m + kLiftOff_m) trace.lift_off_ns = t.exposed_at_ns;
+    if (trace.lift_off_ns == kNever && t.flight_time_s > 0)
+      trace.lift_off_ns = t.exposed_at_ns - from_seconds(static_cast<double>(t.flight_time_s));
 }
 
 }  // namespace

@@ -24,7 +24,8 @@ struct Bar {
   Over over;
   const char* unit;
   bool at_most;  ///< else at least
-  double bound;  ///< NaN: no bar, only reported
+  double bound;          ///< NaN: no bar, only reported
+  bool if_told = false;  ///< left out where no flight tells it (what lockstep cannot measure)
 };
 
 struct Judge {
@@ -33,10 +34,10 @@ struct Judge {
   std::vector<Bar> bars;
 };
 
-/// The judge of a mission; nullptr if it has none but to be flown to its end.
-const Judge* judge_of(const std::string& mission);
+/// The judge of a mission; one that has no row of its own must be flown to its end.
+const Judge& judge_of(const std::string& mission);
 
-/// Holds the figures of `runs` flights against the bars. A figure that is NaN in any run misses its bar.
+/// Holds the figures of `runs` flights against the bars. A figure that is NaN in any run misses its bar; no runs miss all.
 std::vector<tools::Result> verdict(const Judge& judge, const std::vector<Measures>& runs);
 
 /// NaN when there is no such figure.

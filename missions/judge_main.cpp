@@ -11,18 +11,22 @@ int main(int argc, char** argv) {
   app.name("wasp judge");
   std::string mission;
   std::filesystem::path folder;
+  std::vector<std::string> configs;
+  std::string world;
   std::uint32_t seed = 1;
   app.add_option("MISSION", mission, "which it was")->required();
   app.add_option("FOLDER", folder, "of the run; its log/ is read")->required()->check(CLI::ExistingDirectory);
   app.add_option("--seed", seed, "of the simulated world it was flown in")->capture_default_str();
+  app.add_option("--config", configs, "further flight configuration it was flown with")->check(CLI::ExistingFile);
+  app.add_option("--world", world, "VRML97 file it was flown in instead of the mission's world")->check(CLI::ExistingFile);
   CLI11_PARSE(app, argc, argv);
   try {
-    const MissionSetup setup = load_mission(mission, seed);
-    const Judge* judge = judge_of(mission);
-    if (judge == nullptr) return 0;
+    MissionSetup setup = load_mission(mission, seed, configs);
+    setup.sim.world_file = world;
+    const Judge& judge = judge_of(mission);
     WorldProbe probe(setup);
     bool ok = true;
-    for (const auto& r : verdict(*judge, {judge->measure(read_trace(folder / "log"), setup, probe)})) {
+    for (const auto& r : verdict(judge, {judge.measure(read_trace(folder / "log"), setup, probe)})) {
       std::cout << wasp::tools::to_json(r).dump() << "\n";
       ok = ok && r.ok;
     }

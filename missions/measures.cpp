@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "control/mission.h"
 #include "sim/scene_generators.h"
 #include "tools/quantiles.h"
 #include "vision/edge_altitude.h"
 #include "vision/heading_rate.h"
+#include "vision/landing.h"
 
 namespace wasp::missions {
 namespace {
@@ -17,8 +19,13 @@ constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 constexpr double kSettle_s = 5;
 
 double north_m(const Truth& t) { return static_cast<double>(t.position_ned_m[0]); }
-double east_m(const Truth& t) { return static_cast<double>(t.position_ned_m[1]); }
 double height_m(const Truth& t) { return static_cast<double>(t.height_m); }
+
+/// Forward speed over ground along the heading.
+double forward_mps(const Truth& t) {
+  const double yaw = euler_of(t).yaw_rad;
+  return static_cast<double>(t.velocity_ned_mps[0]) * std::cos(yaw) + static_cast<double>(t.velocity_ned_mps[1]) * std::sin(yaw);
+}
 
 /// Truth of the stretch on mission legs.
 std::vector<const Truth*> on_legs(const FlightTrace& trace) {
@@ -31,27 +38,28 @@ std::vector<const Truth*> on_legs(const FlightTrace& trace) {
   return rows;
 }
 
-/// Distances along the flight from lift-off + `skip_s` to the end of the legs, at most 20 a second.
+/// Distances along the legs from `skip_s` after lift-off on, at most 20 a second; NaN where none was taken.
 struct Nearest {
   double around_m = kNone;
   double over_sum_m = 0;
-  int looks = 0;
-  TimeNs first_hit_ns = kNever;
+  int looks = 0, hits = 0;
+  [[nodiscard]] double collisions() const { return looks == 0 ? kNone : hits > 0 ? 1 : 0; }
+  [[nodiscard]] double mean_over_m() const { return looks == 0 ? kNone : over_sum_m / looks; }
 };
 
-Nearest nearest_along(const FlightTrace& trace, WorldProbe& probe, double skip_s) {
+Nearest nearest_along(const FlightTrace& trace, const WorldProbe& probe, double skip_s) {
+  constexpr double kAloft_m = 0.6;  // lower down the floor is no obstacle
   Nearest out;
   double looked_s = -1;
   for (const Truth* t : on_legs(trace)) {
     const double s = trace.seconds(t->exposed_at_ns);
-    if (s < skip_s || s - looked_s < 0.045) continue;
+    if (trace.lift_off_ns == kNever || s < skip_s || s - looked_s < 0.045) continue;
     looked_s = s;
-    const auto look = probe.look(*t, s);
+    const auto look = probe.look(*t);
     out.around_m = std::fmin(out.around_m, look.around_m);
     out.over_sum_m += probe.height_over(*t);
+    out.hits += (height_m(*t) > kAloft_m ? look.collides_in_flight : look.collides) ? 1 : 0;
     ++out.looks;
-    const bool aloft = height_m(*t) > 0.6;
-    if ((aloft ? look.collides_in_flight : look.collides) && out.first_hit_ns == kNever) out.first_hit_ns = t->exposed_at_ns;
   }
   return out;
 }
@@ -74,6 +82,8 @@ double rms(const std::vector<double>& v) {
   return v.empty() ? kNone : std::sqrt(sum / static_cast<double>(v.size()));
 }
 
+double greatest(const std::vector<double>& v) { return v.empty() ? kNone : *std::max_element(v.begin(), v.end()); }
+
 int avoids_raised(const FlightTrace& trace) {
   int raised = 0;
   for (std::size_t i = 1; i < trace.commands.size(); ++i)
@@ -84,13 +94,21 @@ int avoids_raised(const FlightTrace& trace) {
 }  // namespace
 
 double flown_to_its_end(const FlightTrace& trace) {
-  if (trace.commands.empty()) return 0;
+  constexpr double kAloft_m = 0.25, kShare = 0.7;
+  const auto legs = on_legs(trace);
+  if (trace.commands.empty() || legs.empty()) return 0;
   const auto phase = static_cast<control::MissionPhase>(trace.commands.back().mission_phase);
-  return phase == control::MissionPhase::kDone ? 1 : 0;
+  const auto aloft = std::count_if(legs.begin(), legs.end(), [](const Truth* t) { return height_m(*t) > kAloft_m; });
+  const bool flew = static_cast<double>(aloft) >= kShare * static_cast<double>(legs.size());
+  return phase == control::MissionPhase::kDone && flew ? 1 : 0;
+}
+
+Measures measure_flight(const FlightTrace& trace, const MissionSetup&, WorldProbe&) {
+  return {{"flown to its end", flown_to_its_end(trace)}};
 }
 
 Measures measure_hover(const FlightTrace& trace, const MissionSetup& setup, WorldProbe&) {
-  std::vector<double> worst_rms{0}, worst{0};
+  std::vector<double> worst_rms, worst;
   for (const LegSpan& leg : legs_of(trace)) {
     const TimeNs from_ns = trace.commands[leg.first].due_at_ns + from_seconds(kSettle_s);
     const TimeNs to_ns = trace.commands[leg.last].due_at_ns;
@@ -103,8 +121,8 @@ Measures measure_hover(const FlightTrace& trace, const MissionSetup& setup, Worl
     for (const double e : errors) worst.push_back(std::fabs(e));
   }
   return {{"flown to its end", flown_to_its_end(trace)},
-          {"RMS height error", *std::max_element(worst_rms.begin(), worst_rms.end())},
-          {"greatest excursion", *std::max_element(worst.begin(), worst.end())}};
+          {"RMS height error", greatest(worst_rms)},
+          {"greatest excursion", greatest(worst)}};
 }
 
 YawRates yaw_rates(const FlightTrace& trace, const std::string& behaviour) {
@@ -143,27 +161,39 @@ Measures measure_yaw(const FlightTrace& trace, const MissionSetup&, WorldProbe&)
   return m;
 }
 
+/// Frames until the vehicle, flying on as it does at `t`, touches something; NaN if nothing is in its way.
+double frames_to_impact(const Truth& t, const WorldProbe& probe, double rate_hz) {
+  const double yaw = euler_of(t).yaw_rad, speed = forward_mps(t);
+  Truth ahead = t;
+  for (double d = 0; d < 15 && speed > 0; d += 0.02) {
+    ahead.position_ned_m[0] = t.position_ned_m[0] + static_cast<float>(d * std::cos(yaw));
+    ahead.position_ned_m[1] = t.position_ned_m[1] + static_cast<float>(d * std::sin(yaw));
+    if (probe.look(ahead).collides) return d / speed * rate_hz;
+  }
+  return kNone;
+}
+
 Measures measure_wall(const FlightTrace& trace, const MissionSetup& setup, WorldProbe& probe) {
+  const auto& legs = setup.flight.control.mission.legs;
   double frames = kNone, speed = kNone;
-  for (const Cue& c : trace.of("time_to_contact")) {
-    if (c.body.avoid == 0) continue;
-    const Truth& t = trace.truth_at(c.exposed_at_ns);
-    const double yaw = euler_of(t).yaw_rad;
-    speed = static_cast<double>(t.velocity_ned_mps[0]) * std::cos(yaw) + static_cast<double>(t.velocity_ned_mps[1]) * std::sin(yaw);
-    // The way left is read from the trace itself: fly on at this speed until the probe touches something.
-    Truth ahead = t;
-    for (double d = 0; d < 15; d += 0.02) {
-      ahead.position_ned_m[0] = t.position_ned_m[0] + static_cast<float>(d * std::cos(yaw));
-      ahead.position_ned_m[1] = t.position_ned_m[1] + static_cast<float>(d * std::sin(yaw));
-      if (!probe.look(ahead, trace.seconds(t.exposed_at_ns)).collides) continue;
-      frames = d / std::max(speed, 0.05) * setup.sim.camera_rate_hz;
-      break;
+  int early = 0;
+  for (const LegSpan& leg : legs_of(trace)) {
+    const double wanted_mps = static_cast<double>(legs[static_cast<std::size_t>(leg.leg)].forward_mps);
+    for (std::size_t i = leg.first; i <= leg.last && std::isnan(speed); ++i) {
+      if (trace.commands[i].avoid == 0) continue;
+      const Truth& t = trace.truth_at(trace.commands[i].due_at_ns);
+      if (wanted_mps <= 0 || forward_mps(t) < 0.5 * wanted_mps) {
+        ++early;  // before there was anything to avoid
+        continue;
+      }
+      speed = forward_mps(t);
+      frames = frames_to_impact(t, probe, setup.sim.camera_rate_hz);
     }
-    break;
   }
   const Nearest near = nearest_along(trace, probe, 0);
   return {{"flown to its end", flown_to_its_end(trace)},
-          {"collisions", near.first_hit_ns != kNever ? 1 : 0},
+          {"collisions", near.collisions()},
+          {"ticks with avoid before the approach", early},
           {"frames from avoid to impact", frames},
           {"speed at avoid", speed},
           {"closest approach", near.around_m}};
@@ -174,11 +204,12 @@ Measures measure_corridor(const FlightTrace& trace, const MissionSetup&, WorldPr
   std::vector<double> lateral;
   double way_m = 0;
   for (const Truth* t : on_legs(trace)) {
-    way_m = std::max(way_m, north_m(*t));
-    if (north_m(*t) > 4) lateral.push_back(east_m(*t));
+    const Vec3 at = probe.in_world(*t);
+    way_m = std::max(way_m, static_cast<double>(at.x()));
+    if (at.x() > 4) lateral.push_back(static_cast<double>(at.y()));  // what the start was astray is steered away by then
   }
   return {{"flown to its end", flown_to_its_end(trace)},
-          {"collisions", near.first_hit_ns != kNever ? 1 : 0},
+          {"collisions", near.collisions()},
           {"false avoids", avoids_raised(trace)},
           {"least distance", near.around_m},
           {"lateral RMS by width", rms(lateral) / static_cast<double>(sim::kCorridorWidth_m)},
@@ -218,24 +249,31 @@ Measures measure_arena(const FlightTrace& trace, const MissionSetup& setup, Worl
 }
 
 Measures measure_city(const FlightTrace& trace, const MissionSetup&, WorldProbe& probe) {
-  const Nearest near = nearest_along(trace, probe, 3);
-  double height_sum = 0, overshoot = 0, way_m = 0;
-  int n = 0;
+  constexpr double kTakenOff_s = 3;
+  const Nearest near = nearest_along(trace, probe, kTakenOff_s);
+  std::vector<double> heights;
+  double way_m = 0, overshoot_m = 0;
   for (const Truth* t : on_legs(trace)) {
-    if (trace.seconds(t->exposed_at_ns) < 3) continue;
-    height_sum += -static_cast<double>(t->position_ned_m[2]);
+    if (trace.seconds(t->exposed_at_ns) < kTakenOff_s) continue;
+    heights.push_back(height_m(*t));
     way_m = std::max(way_m, north_m(*t));
-    ++n;
   }
-  for (const Command& c : trace.commands)
-    if (c.height_setpoint_m > 0 && trace.seconds(c.due_at_ns) > 3 && c.mission_phase < 20)
-      overshoot = std::max(overshoot, height_m(trace.truth_at(c.due_at_ns)) - static_cast<double>(c.height_setpoint_m));
+  // Above the greatest setpoint of the last three seconds: what lags behind a falling one is no overshoot.
+  const auto& commands = trace.commands;
+  for (const LegSpan& leg : legs_of(trace))
+    for (std::size_t i = leg.first; i <= leg.last; ++i) {
+      if (trace.seconds(commands[i].due_at_ns) < kTakenOff_s) continue;
+      double setpoint_m = 0;
+      for (std::size_t k = i > 60 ? i - 60 : 0; k <= i; ++k)
+        setpoint_m = std::max(setpoint_m, static_cast<double>(commands[k].height_setpoint_m));
+      overshoot_m = std::max(overshoot_m, height_m(trace.truth_at(commands[i].due_at_ns)) - setpoint_m);
+    }
   return {{"flown to its end", flown_to_its_end(trace)},
-          {"collisions", near.first_hit_ns != kNever ? 1 : 0},
+          {"collisions", near.collisions()},
           {"least distance to a box", near.around_m},
-          {"mean height over obstacles", near.looks > 0 ? near.over_sum_m / near.looks : kNone},
-          {"mean height", n > 0 ? height_sum / n : kNone},
-          {"overshoot above the setpoint", overshoot},
+          {"mean height over obstacles", near.mean_over_m()},
+          {"mean height", heights.empty() ? kNone : std::accumulate(heights.begin(), heights.end(), 0.0) / static_cast<double>(heights.size())},
+          {"overshoot above the setpoint", heights.empty() ? kNone : overshoot_m},
           {"way flown", way_m}};
 }
 
@@ -243,12 +281,10 @@ Measures measure_edge_height(const FlightTrace& trace, const MissionSetup& setup
   using Detail = vision::EdgeAltitude::Detail;
   std::vector<double> error;
   double lambda = kNone, sigma = kNone;
-  int estimates = 0;
   for (const Cue& c : trace.of("edge_altitude")) {
-    const auto now = static_cast<double>(c.body.detail[Detail::kEdgesPerMSigma]);
-    if (now > 0) {
-      estimates += now != sigma ? 1 : 0;
-      lambda = static_cast<double>(c.body.detail[Detail::kEdgesPerM]), sigma = now;
+    if (c.body.detail[Detail::kEdgesPerMSigma] > 0) {
+      lambda = static_cast<double>(c.body.detail[Detail::kEdgesPerM]);
+      sigma = static_cast<double>(c.body.detail[Detail::kEdgesPerMSigma]);
     }
     if (c.body.validity != Validity::kValid || c.body.has_height == 0 || !(sigma > 0)) continue;
     const double truth_m = height_m(trace.truth_at(c.exposed_at_ns));
@@ -261,32 +297,42 @@ Measures measure_edge_height(const FlightTrace& trace, const MissionSetup& setup
           {"height error once lambda is known, median share", error.empty() ? kNone : tools::median(error)}};
 }
 
-Measures measure_landing(const FlightTrace& trace, const MissionSetup&, WorldProbe&) {
-  std::vector<double> flow;
-  double end_m = kNone, sink = kNone;
-  for (const Cue& c : trace.of("landing")) {
-    if (c.body.validity != Validity::kValid) continue;
-    const Truth& t = trace.truth_at(c.exposed_at_ns);
-    const double speed = std::hypot(static_cast<double>(t.velocity_ned_mps[0]), static_cast<double>(t.velocity_ned_mps[1]));
-    flow.push_back(speed / std::max(0.05, -static_cast<double>(t.position_ned_m[2])));
-  }
-  for (const Truth* t : on_legs(trace)) end_m = height_m(*t), sink = static_cast<double>(t->velocity_ned_mps[2]);
-  const double middle = tools::median(flow);
+Measures measure_landing(const FlightTrace& trace, const MissionSetup& setup, WorldProbe&) {
+  constexpr double kSettled_s = 4, kLow_m = 0.45;
+  const double wanted_radps = static_cast<double>(vision::Landing::Params{}.flow_radps);
+  const auto& legs = setup.flight.control.mission.legs;
   std::vector<double> off;
-  for (std::size_t i = flow.size() / 4; i < flow.size(); ++i) off.push_back(flow[i] / middle - 1);
-  return {{"ventral flow held, mean error", rms(off)}, {"ventral flow", middle}, {"height at the end", end_m}, {"sink rate at the end", sink}};
-}
-
-Measures measure_all(const FlightTrace& trace, const MissionSetup&, WorldProbe& probe) {
-  double ran = 0, steps = 0, over = 0;
-  for (const auto& [name, cues] : trace.cues) {
-    ran += cues.size() > 10 ? 1 : 0;
-    for (const Cue& c : cues) over += c.over_budget != 0 ? 1 : 0, ++steps;
+  double end_m = kNone, sink_mps = kNone;
+  for (const LegSpan& leg : legs_of(trace)) {
+    if (!legs[static_cast<std::size_t>(leg.leg)].behaviours_climb) continue;
+    const TimeNs from_ns = trace.commands[leg.first].due_at_ns + from_seconds(kSettled_s);
+    for (const Truth& t : trace.truth) {
+      if (t.exposed_at_ns < from_ns || t.exposed_at_ns > trace.commands[leg.last].due_at_ns) continue;
+      end_m = height_m(t), sink_mps = static_cast<double>(t.velocity_ned_mps[2]);
+      if (end_m > kLow_m) off.push_back(forward_mps(t) / end_m / wanted_radps - 1);
+    }
   }
   return {{"flown to its end", flown_to_its_end(trace)},
-          {"collisions", nearest_along(trace, probe, 1).first_hit_ns != kNever ? 1 : 0},
-          {"behaviours that ran", ran},
-          {"share of steps over budget", steps > 0 ? over / steps : kNone}};
+          {"ventral flow off its setpoint, RMS share", off.empty() ? kNone : rms(off)},
+          {"height at the end", end_m},
+          {"sink rate at the end", sink_mps}};
+}
+
+Measures measure_all(const FlightTrace& trace, const MissionSetup& setup, WorldProbe& probe) {
+  constexpr std::size_t kSpoke = 10;
+  double steps = 0, over = 0, silent = 0;
+  bool timed = false;
+  for (const auto& row : setup.flight.behaviours) silent += row.enabled && trace.of(row.name).size() < kSpoke ? 1 : 0;
+  for (const auto& [name, cues] : trace.cues)
+    for (const Cue& c : cues) {
+      over += c.over_budget != 0 ? 1 : 0, ++steps;
+      timed = timed || c.finished_at_ns != c.started_at_ns;
+    }
+  Measures m = measure_hover(trace, setup, probe);
+  m.push_back({"collisions", nearest_along(trace, probe, 1).collisions()});
+  m.push_back({"enabled behaviours that were silent", silent});
+  if (timed) m.push_back({"share of steps over budget", over / steps});
+  return m;
 }
 
 }  // namespace wasp::missions

@@ -6,9 +6,11 @@
 
 namespace wasp::missions {
 
-/// flown: 1 if the mission came to its end in order.
+/// 1 if the mission came to its end in order and the vehicle was in the air for most of its legs.
 double flown_to_its_end(const FlightTrace& trace);
 
+/// Nothing but whether it was flown.
+Measures measure_flight(const FlightTrace& trace, const MissionSetup& setup, WorldProbe& probe);
 Measures measure_hover(const FlightTrace& trace, const MissionSetup& setup, WorldProbe& probe);
 /// Correlation and RMS difference of the visual yaw rate and the gyro's, pair by pair of frames (fig. 5.6).
 Measures measure_yaw(const FlightTrace& trace, const MissionSetup& setup, WorldProbe& probe);
@@ -22,7 +24,7 @@ Measures measure_arena(const FlightTrace& trace, const MissionSetup& setup, Worl
 Measures measure_city(const FlightTrace& trace, const MissionSetup& setup, WorldProbe& probe);
 /// Height from edges with lambda unknown (figs 7.8 ... 7.12 in flight).
 Measures measure_edge_height(const FlightTrace& trace, const MissionSetup& setup, WorldProbe& probe);
-/// Grazing landing: ventral flow held, height falls with the way, touch-down slow.
+/// Grazing landing: ventral flow held, low and slow at the end.
 Measures measure_landing(const FlightTrace& trace, const MissionSetup& setup, WorldProbe& probe);
 /// Everything at once: who spoke, who was over budget.
 Measures measure_all(const FlightTrace& trace, const MissionSetup& setup, WorldProbe& probe);

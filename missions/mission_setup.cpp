@@ -27,6 +27,7 @@ MissionSetup load_mission(const std::string& name, std::uint32_t seed, const std
   setup.flight.camera = setup.sim.camera;
   setup.flight.camera_down.geometry = setup.sim.down.setup.geometry;
   setup.flight.camera_down.enabled = setup.sim.down.enabled;
+  scheduling::check_streams(all_behaviours(), setup.flight);
   return setup;
 }
 
@@ -39,8 +40,6 @@ sim::LockstepOptions lockstep_options(const MissionSetup& setup) {
   for (std::size_t i = 0; i < table.size(); ++i) {
     if (!setup.flight.behaviours[i].enabled) continue;
     const auto& row = table[i];
-    if (looks_down(row.stream) && !setup.sim.down.enabled)
-      throw std::runtime_error(setup.name + ": behaviour '" + row.name + "' needs [camera_down] in sim.toml");
     const auto& camera = looks_down(row.stream) ? setup.flight.camera_down.geometry : setup.flight.camera;
     sim::LockstepBehaviour b{static_cast<std::uint32_t>(i), row.stream, row.publishes, {}};
     b.step = [step = row.make_stepper(camera, setup.flight.behaviour_params[i])](const BehaviourInput& input) {

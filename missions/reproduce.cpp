@@ -56,19 +56,24 @@ std::string results_table(const CampaignResult& c) {
   return t + "</table>";
 }
 
+std::string how_flown(const CampaignResult& c) {
+  const std::size_t n = c.runs.size();
+  const std::uint32_t first = c.options.first_seed;
+  return fmt::format(
+      "<p class='soft small'>{} flight{}, seeds {} to {}; {:.0f} s of flight in {:.0f} s, {:.1f} &times; real time. Again: "
+      "<code>wasp campaign {} --runs {} --seed {}</code>; one of them: <code>--only SEED --out DIR</code>; in real time: "
+      "<code>./fly --mission {} --seed SEED</code>.</p>\n",
+      n, n == 1 ? "" : "s", first, first + n - 1, c.flown_s(), c.wall_s, c.speed_up(), c.options.mission, n, first,
+      c.options.mission);
+}
+
 std::string section(const ExperimentResult& r) {
   const Experiment& e = *r.experiment;
   std::string s = fmt::format("<h2 id='{}'>{} <span class='soft'>({})</span></h2>\n", e.mission, escape_html(e.title),
                               escape_html(e.thesis_figures));
   s += fmt::format("<p><strong>The thesis:</strong> {}</p>\n<div class='card scroll'>{}</div>\n", escape_html(e.thesis_result),
                    results_table(r.campaign));
-  s += fmt::format(
-      "<p class='soft small'>{} flight{}, seeds {} to {}; {:.0f} s of flight in {:.0f} s, {:.1f} &times; real time. Again: "
-      "<code>wasp campaign {} --runs {}</code>; one of them: <code>--only SEED --out DIR</code>; in real time: "
-      "<code>./fly --mission {} --seed SEED</code>.</p>\n",
-      r.campaign.runs.size(), r.campaign.runs.size() == 1 ? "" : "s", r.campaign.options.first_seed,
-      r.campaign.options.first_seed + r.campaign.runs.size() - 1, r.campaign.flown_s(), r.campaign.wall_s,
-      r.campaign.speed_up(), e.mission, r.campaign.runs.size(), e.mission);
+  if (!r.campaign.runs.empty()) s += how_flown(r.campaign);
   for (const auto& run : r.campaign.runs)
     if (!run.error.empty()) s += fmt::format("<p class='bad'>Seed {}: {}</p>\n", run.seed, escape_html(run.error));
   for (const auto& remark : r.remarks) s += fmt::format("<p>{}</p>\n", escape_html(remark));

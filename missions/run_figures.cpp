@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <fstream>
 #include <stdexcept>
 
@@ -18,7 +19,7 @@ constexpr std::size_t kSlices = 300, kMostFlights = 100;
 /// What a mission's figures are made of: which curves are taken from a trace, and the plots they go into.
 struct CurveKind {
   const char* name;
-  Series (*take)(const FlightTrace&);
+  Series (*take)(const FlightTrace&, const WorldProbe&);
 };
 struct PlotKind {
   const char* file;
@@ -26,7 +27,7 @@ struct PlotKind {
   const char* x_label;
   const char* y_label;
   std::vector<const char*> curves;
-  bool equal_axes = false;
+  bool first_flight_only = false;
 };
 struct FigureSet {
   std::vector<const char*> missions;
@@ -36,41 +37,50 @@ struct FigureSet {
 
 bool in_flight(const FlightTrace& trace, TimeNs at_ns) { return trace.lift_off_ns != kNever && at_ns >= trace.lift_off_ns; }
 
-Series height_over_time(const FlightTrace& trace) {
+Series height_over_time(const FlightTrace& trace, const WorldProbe&) {
   Series s;
   for (const Truth& t : trace.truth)
     if (in_flight(trace, t.exposed_at_ns)) s.add(trace.seconds(t.exposed_at_ns), static_cast<double>(t.height_m));
   return s;
 }
-Series setpoint_over_time(const FlightTrace& trace) {
+Series setpoint_over_time(const FlightTrace& trace, const WorldProbe&) {
   Series s;
   for (const Command& c : trace.commands)
     if (in_flight(trace, c.due_at_ns) && c.height_setpoint_m > 0) s.add(trace.seconds(c.due_at_ns), static_cast<double>(c.height_setpoint_m));
   return s;
 }
-Series height_over_way(const FlightTrace& trace) {
+Series height_over_way(const FlightTrace& trace, const WorldProbe&) {
   Series s;
   for (const Truth& t : trace.truth)
     if (in_flight(trace, t.exposed_at_ns)) s.add(static_cast<double>(t.position_ned_m[0]), -static_cast<double>(t.position_ned_m[2]));
   return s;
 }
-Series setpoint_over_way(const FlightTrace& trace) {
+Series setpoint_over_way(const FlightTrace& trace, const WorldProbe&) {
   Series s;
   for (const Command& c : trace.commands)
     if (in_flight(trace, c.due_at_ns) && c.height_setpoint_m > 0)
       s.add(static_cast<double>(trace.truth_at(c.due_at_ns).position_ned_m[0]), static_cast<double>(c.height_setpoint_m));
   return s;
 }
-Series path(const FlightTrace& trace) {
+Series skyline(const FlightTrace& trace, const WorldProbe& probe) {
   Series s;
   for (const Truth& t : trace.truth)
-    if (in_flight(trace, t.exposed_at_ns)) s.add(static_cast<double>(t.position_ned_m[0]), static_cast<double>(t.position_ned_m[1]));
+    if (in_flight(trace, t.exposed_at_ns))
+      s.add(static_cast<double>(t.position_ned_m[0]), -static_cast<double>(t.position_ned_m[2]) - probe.height_over(t));
   return s;
 }
-Series visual_yaw(const FlightTrace& trace) { return yaw_rates(trace, "heading_rate").visual; }
-Series printed_yaw(const FlightTrace& trace) { return yaw_rates(trace, "heading_log_polar").visual; }
-Series gyro_yaw(const FlightTrace& trace) { return yaw_rates(trace, "heading_rate").gyro; }
-Series contact(const FlightTrace& trace) {
+Series path(const FlightTrace& trace, const WorldProbe& probe) {
+  Series s;
+  for (const Truth& t : trace.truth) {
+    const Vec3 at = probe.in_world(t);
+    if (in_flight(trace, t.exposed_at_ns)) s.add(static_cast<double>(at.x()), static_cast<double>(at.y()));
+  }
+  return s;
+}
+Series visual_yaw(const FlightTrace& trace, const WorldProbe&) { return yaw_rates(trace, "heading_rate").visual; }
+Series printed_yaw(const FlightTrace& trace, const WorldProbe&) { return yaw_rates(trace, "heading_log_polar").visual; }
+Series gyro_yaw(const FlightTrace& trace, const WorldProbe&) { return yaw_rates(trace, "heading_rate").gyro; }
+Series contact(const FlightTrace& trace, const WorldProbe&) {
   Series s;
   for (const Cue& c : trace.of("time_to_contact"))
     if (c.body.validity == Validity::kValid && in_flight(trace, c.exposed_at_ns))
@@ -84,15 +94,15 @@ Series heading_wish(const FlightTrace& trace, const char* behaviour) {
       s.add(trace.seconds(c.exposed_at_ns), static_cast<double>(c.body.heading_rate_radps));
   return s;
 }
-Series balance_wish(const FlightTrace& trace) { return heading_wish(trace, "flow_balance"); }
-Series obstacle_wish(const FlightTrace& trace) { return heading_wish(trace, "obstacle_depth"); }
-Series edge_height_cue(const FlightTrace& trace) {
+Series balance_wish(const FlightTrace& trace, const WorldProbe&) { return heading_wish(trace, "flow_balance"); }
+Series obstacle_wish(const FlightTrace& trace, const WorldProbe&) { return heading_wish(trace, "obstacle_depth"); }
+Series edge_height_cue(const FlightTrace& trace, const WorldProbe&) {
   Series s;
   for (const Cue& c : trace.of("edge_altitude"))
     if (c.body.has_height != 0 && in_flight(trace, c.exposed_at_ns)) s.add(trace.seconds(c.exposed_at_ns), static_cast<double>(c.body.height_m));
   return s;
 }
-Series ground_height_cue(const FlightTrace& trace) {
+Series ground_height_cue(const FlightTrace& trace, const WorldProbe&) {
   Series s;
   for (const Cue& c : trace.of("ground_altitude"))
     if (c.body.has_height != 0 && in_flight(trace, c.exposed_at_ns)) s.add(trace.seconds(c.exposed_at_ns), static_cast<double>(c.body.height_m));
@@ -104,7 +114,7 @@ const std::vector<FigureSet>& sets() {
       {{"turntable", "hover-yaw", "aggressive"},
        {{"gyro", &gyro_yaw}, {"visual: similarity fit", &visual_yaw}, {"visual: log-polar maps", &printed_yaw}},
        {{"yaw_rate", "Yaw rate, inertial and visual", "time [s]", "yaw rate [rad/s]", {"gyro", "visual: similarity fit", "visual: log-polar maps"}}}},
-      {{"wall"}, {{"time to contact", &contact}, {"way", &path}},
+      {{"wall"}, {{"time to contact", &contact}},
        {{"time_to_contact", "Time to contact in each approach", "time [s]", "frames", {"time to contact"}}}},
       {{"corridor", "corridor-empty"},
        {{"path", &path}, {"gross (flow balance)", &balance_wish}, {"fine (obstacles)", &obstacle_wish}},
@@ -112,8 +122,10 @@ const std::vector<FigureSet>& sets() {
         {"heading", "Heading wishes of the gross and the fine process", "time [s]", "yaw rate [rad/s]", {"gross (flow balance)", "fine (obstacles)"}}}},
       {{"arena"}, {{"height", &height_over_time}},
        {{"height", "Height after the edge has moved", "time since lift-off [s]", "height [m]", {"height"}}}},
-      {{"city-max", "city-near", "city-defocus"}, {{"height", &height_over_way}, {"setpoint", &setpoint_over_way}},
-       {{"height", "Height along the way, all flights", "along [m]", "height [m]", {"height"}}}},
+      {{"city-max", "city-near", "city-defocus"},
+       {{"height", &height_over_way}, {"setpoint", &setpoint_over_way}, {"roofs and ground below", &skyline}},
+       {{"single", "One flight over the boxes below it", "along [m]", "height [m]", {"height", "setpoint", "roofs and ground below"}, true},
+        {"height", "Height along the way, all flights", "along [m]", "height [m]", {"height"}}}},
       {{"hover", "edge-height", "landing", "all"},
        {{"truth", &height_over_time}, {"setpoint", &setpoint_over_time}, {"from the ground plane", &ground_height_cue}, {"from edges", &edge_height_cue}},
        {{"height", "Height", "time since lift-off [s]", "height [m]", {"truth", "setpoint", "from the ground plane", "from edges"}}}},
@@ -132,12 +144,14 @@ const FigureSet* set_of(const std::string& mission) {
 
 RunFigures::RunFigures(std::string mission) : mission_(std::move(mission)) {}
 
-void RunFigures::add(std::uint32_t seed, const FlightTrace& trace) {
+void RunFigures::add(std::uint32_t seed, const FlightTrace& trace, const WorldProbe& probe) {
   const FigureSet* set = set_of(mission_);
   if (set == nullptr || flights_.size() >= kMostFlights) return;
   Flight flight{seed, {}};
-  for (const CurveKind& c : set->curves) flight.series.emplace_back(c.name, tools::thin_envelope(c.take(trace), kSlices));
-  flights_.push_back(std::move(flight));
+  for (const CurveKind& c : set->curves) flight.series.emplace_back(c.name, tools::thin_envelope(c.take(trace, probe), kSlices));
+  const auto after = std::upper_bound(flights_.begin(), flights_.end(), seed,
+                                      [](std::uint32_t s, const Flight& f) { return s < f.seed; });
+  flights_.insert(after, std::move(flight));
 }
 
 std::vector<Figure> RunFigures::figures() const {
@@ -148,7 +162,7 @@ std::vector<Figure> RunFigures::figures() const {
     Figure f{mission_ + "-" + kind.file, kind.title, {}};
     f.plot.title = kind.title, f.plot.x_label = kind.x_label, f.plot.y_label = kind.y_label;
     for (std::size_t c = 0; c < kind.curves.size(); ++c)
-      for (std::size_t i = 0; i < flights_.size(); ++i)
+      for (std::size_t i = 0; i < (kind.first_flight_only ? 1 : flights_.size()); ++i)
         for (const auto& [name, series] : flights_[i].series) {
           if (name != kind.curves[c] || series.size() == 0) continue;
           f.plot.curves.push_back({i == 0 ? name : std::string(), {fmt::format("c{}", c), "thin"}, series});

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "missions/flight_trace.h"
+#include "missions/world_probe.h"
 #include "tools/report_plot.h"
 
 namespace wasp::missions {
@@ -17,11 +18,11 @@ struct Figure {
   tools::Plot plot;
 };
 
-/// Collects flights (thinned) and draws them.
+/// Collects flights (thinned) and draws them, in the order of their seeds.
 class RunFigures {
  public:
   explicit RunFigures(std::string mission);
-  void add(std::uint32_t seed, const FlightTrace& trace);
+  void add(std::uint32_t seed, const FlightTrace& trace, const WorldProbe& probe);
   [[nodiscard]] std::vector<Figure> figures() const;
   /// Writes each figure as FOLDER/STEM.svg. Throws naming the file.
   void write(const std::filesystem::path& folder) const;

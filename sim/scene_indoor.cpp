@@ -10,6 +10,7 @@
 namespace wasp::sim {
 namespace {
 
+constexpr float kPi = std::numbers::pi_v<float>;
 constexpr float kH = kCorridorHeight_m, kW = kCorridorWidth_m;
 const Material kPaper{kWallpaper, 2.f, 0.95f}, kFloorMaterial{kNatural, 1.6f, 0.8f},
     kCeilingMaterial{kWallpaper, 1.2f, 1.1f};
@@ -55,6 +56,12 @@ class Builder {
   }
   Random& random() { return random_; }
   Scene finish(const char* title) { return {std::move(world_), Vec3::Zero(), 0, title}; }
+  /// The same with the start up to 0.4 m to one side and 10 degrees askew, from the seed.
+  Scene finish_astray(const char* title, std::uint32_t seed) {
+    Random random(mix(seed, 61));
+    const auto side = static_cast<float>(random.uniform(-0.4, 0.4)), askew = static_cast<float>(random.uniform(-10, 10));
+    return {std::move(world_), Vec3(0, side, 0), askew * kPi / 180, title};
+  }
 
  private:
   Random random_;
@@ -80,7 +87,7 @@ Builder straight(std::uint32_t seed) {
 
 }  // namespace
 
-Scene make_corridor(std::uint32_t seed) { return straight(seed).finish("corridor"); }
+Scene make_corridor(std::uint32_t seed) { return straight(seed).finish_astray("corridor", seed); }
 
 Scene make_corridor_bend(std::uint32_t seed) {
   Builder b(seed);
@@ -111,7 +118,7 @@ Scene make_corridor_obstacles(std::uint32_t seed) {
     b.carton(x, side * (kW / 2 - reach / 2), {b.between(0.3, 0.7), reach, tall});
     if (b.between(0, 1) < 0.7f) side = -side;
   }
-  return b.finish("corridor-obstacles");
+  return b.finish_astray("corridor-obstacles", seed);
 }
 
 /// Cartons keep to one wall, people to the other, so that at least 1.2 m stay free between them. Each walks a half of
@@ -129,7 +136,7 @@ Scene make_corridor_people(std::uint32_t seed) {
         b.world(), first ? "walker_near" : "walker_far",
         {first ? 4.f : 15.f, first ? 14.f : 27.f, lane, b.between(0.4, 0.8), b.between(0.2, 0.8), first, inwards},
         b.random());
-  return b.finish("corridor-people");
+  return b.finish_astray("corridor-people", seed);
 }
 
 /// Four by three rooms of 5 m x 4 m; every inner wall has a doorway of 1 m. The start is the first room's middle.

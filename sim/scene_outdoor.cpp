@@ -98,7 +98,10 @@ Scene make_arena(std::uint32_t seed, const ArenaStep& step) {
   world.begin_mover("edge", std::move(keys), false);
   add_drum(world, kArenaRadius_m - 0.02f, 0, 2 * kArenaHeight_m, {kSoft, 2.f, 0.4f});
   world.end_mover();
-  return {std::move(world), Vec3::Zero(), 0, "arena-step"};
+  Random random(mix(seed, 51));
+  const auto somewhere = [&] { return static_cast<float>(random.uniform(-0.8, 0.8)); };
+  const Vec3 start(somewhere(), somewhere(), 0);
+  return {std::move(world), start, static_cast<float>(random.uniform(0, 1)) * kTwoPi, "arena-step"};
 }
 
 /// The wall's place and angle come from the seed as its texture does.

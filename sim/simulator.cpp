@@ -79,6 +79,7 @@ Truth Simulator::truth() const {
   truth.rate_body_radps = to_floats(s.rate_body_radps);
   truth.height_m = static_cast<float>(-camera.z());
   truth.armed = flight_.armed() ? 1.f : 0.f;
+  truth.flight_time_s = static_cast<float>(flight_time_s());
   return truth;
 }
 

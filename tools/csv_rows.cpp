@@ -69,7 +69,7 @@ std::string_view command_columns() {
 }
 std::string_view truth_columns() {
   return "exposed_at_ns,position_north_m,position_east_m,position_down_m,velocity_north_mps,velocity_east_mps,"
-         "velocity_down_mps,q_w,q_x,q_y,q_z,rate_x_body_radps,rate_y_body_radps,rate_z_body_radps,height_m,armed,"
+         "velocity_down_mps,q_w,q_x,q_y,q_z,rate_x_body_radps,rate_y_body_radps,rate_z_body_radps,height_m,armed,flight_time_s,"
          "number,published_at_ns";
 }
 
@@ -109,7 +109,7 @@ std::string csv_row(const Command& c, const RingStamp& stamp) {
 std::string csv_row(const Truth& t, const RingStamp& stamp) {
   Line line;
   line.add(t.exposed_at_ns).add(t.position_ned_m).add(t.velocity_ned_mps).add(t.q_ned_body).add(t.rate_body_radps);
-  return line.add(t.height_m).add(t.armed).finish(stamp);
+  return line.add(t.height_m).add(t.armed).add(t.flight_time_s).finish(stamp);
 }
 
 std::string_view mode_name(FlightMode mode) {

@@ -60,7 +60,7 @@ std::vector<Result> hover_results(const std::filesystem::path& log, const std::v
     }
     const double rms_m = std::sqrt(square_sum / static_cast<double>(n));
     const bool judged = to_seconds(p.end_ns - p.start_ns - kSettle_ns) >= kLeastJudged_s;
-    Result rms = at_most(p.name + ": RMS height error", rms_m, "m", 0.05);
+    Result rms = at_most(p.name + ": RMS height error", rms_m, "m", 0.03);
     Result worst = at_most(p.name + ": greatest excursion", excursion_m, "m", 0.15);
     if (!judged) {
       rms = {rms.name, rms_m, "m", "", true};

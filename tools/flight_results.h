@@ -20,7 +20,7 @@ struct Phase {
 /// Runs of constant Command::mission_phase in log/commands.csv.
 std::vector<Phase> read_phases(const std::filesystem::path& log);
 
-/// Hover bars of every leg from 5 s after its start: RMS <= 0.05 m, excursion <= 0.15 m against truth. A leg shorter
+/// Hover bars of every leg from 5 s after its start: RMS <= 0.03 m, excursion <= 0.15 m against truth. A leg shorter
 /// than 8 s is reported without a bar.
 std::vector<Result> hover_results(const std::filesystem::path& log, const std::vector<Phase>& phases);
 

@@ -55,10 +55,13 @@ nlohmann::json run_document(const Run& run, const std::vector<Phase>& phases, co
 /// Figures and bars of a mission, from the program that also judges campaigns (missions/judge.h).
 std::vector<Result> judged_by_mission(const Run& run) {
   const fs::path answer = run.folder / "log/judge.txt";
-  ChildProcess judge({program("wasp-judge"), run.options.mission, run.folder.string(), "--seed",
-                      std::to_string(run.options.seed)},
-                     answer.string());
-  while (!judge.poll()) rt::sleep_until(rt::now() + 10 * kMillisecond);
+  std::vector<std::string> arguments{program("wasp-judge"), run.options.mission, run.folder.string(), "--seed",
+                                     std::to_string(run.options.seed)};
+  if (!run.options.config.empty()) arguments.insert(arguments.end(), {"--config", run.options.config});
+  if (!run.options.world.empty()) arguments.insert(arguments.end(), {"--world", run.options.world});
+  ChildProcess judge(arguments, answer.string());
+  const TimeNs deadline = rt::now() + 600 * kSecond;
+  while (!judge.poll() && rt::now() < deadline) rt::sleep_until(rt::now() + 10 * kMillisecond);
   std::vector<Result> results;
   std::ifstream file(answer);
   for (std::string line; std::getline(file, line);)
@@ -68,11 +71,15 @@ std::vector<Result> judged_by_mission(const Run& run) {
   return results;
 }
 
-/// What this mission must show beyond being flown to its end.
-std::vector<Result> mission_results(const Run& run, const std::vector<Phase>& phases) {
+/// What this mission must show beyond being flown to its end. One that was cut short, by an interrupt or by --seconds, is
+/// reported but not judged: nobody flies 60 m in ten seconds.
+std::vector<Result> mission_results(const Run& run, const std::vector<Phase>& phases, bool cut_short) {
   if (!run.options.replay.empty()) return {};
   if (run.options.mission == "hover") return hover_results(run.folder / "log", phases);
-  return judged_by_mission(run);
+  auto results = judged_by_mission(run);
+  if (cut_short || run.options.seconds > 0)
+    for (Result& r : results) r.bar.clear(), r.ok = true;
+  return results;
 }
 
 std::vector<Result> judge(const Run& run, int flight_code, const std::vector<Phase>& phases,
@@ -85,7 +92,7 @@ std::vector<Result> judge(const Run& run, int flight_code, const std::vector<Pha
                      ended_short || summary.mission_result == 1});
   results.push_back(
       {"control ticks commanded by behaviours", static_cast<double>(summary.behaviour_ticks), "", "", true});
-  for (auto& r : mission_results(run, phases)) results.push_back(std::move(r));
+  for (auto& r : mission_results(run, phases, ended_short)) results.push_back(std::move(r));
   for (auto& r : timing_results(summary, allowed_share(run))) results.push_back(std::move(r));
   return results;
 }

@@ -145,6 +145,7 @@ struct Truth {
   std::array<float, 3> rate_body_radps{};
   float height_m = 0;  ///< of the vehicle's reference point (camera) above what is below it
   float armed = 0;
+  float flight_time_s = 0;  ///< since the vehicle first left the ground, 0 before; what moves in the world moves by it
 };
 
 static_assert(sizeof(Cue) % 8 == 0 && sizeof(Command) % 8 == 0 && sizeof(Truth) % 8 == 0);

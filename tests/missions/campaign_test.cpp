@@ -47,8 +47,8 @@ INSTANTIATE_TEST_SUITE_P(Missions, Campaign,
 TEST(CampaignRuns, AFlightAgainByItsSeedIsTheSameToTheBit) {
   const MissionSetup setup = load_mission("arena", 77);
   FlightTrace first, again;
-  (void)fly_once(setup, [&](const FlightTrace& t) { first = t; });
-  (void)fly_once(load_mission("arena", 77), [&](const FlightTrace& t) { again = t; });
+  (void)fly_once(setup, [&](const FlightTrace& t, const WorldProbe&) { first = t; });
+  (void)fly_once(load_mission("arena", 77), [&](const FlightTrace& t, const WorldProbe&) { again = t; });
   ASSERT_EQ(first.truth.size(), again.truth.size());
   for (std::size_t i = 0; i < first.truth.size(); ++i) {
     ASSERT_EQ(first.truth[i].position_ned_m, again.truth[i].position_ned_m) << i;
@@ -66,12 +66,45 @@ TEST(CampaignRuns, AnUnknownMissionListsTheKnownOnes) {
   }
 }
 
-TEST(CampaignRuns, EveryMissionLoadsAndHasAJudge) {
+TEST(CampaignRuns, EveryMissionLoadsAndHasAJudgeOfItsOwn) {
   for (const auto& name : tools::mission_names()) {
     const MissionSetup setup = load_mission(name, 3);
-    EXPECT_NE(judge_of(name), nullptr) << name;
+    EXPECT_EQ(judge_of(name).mission, name);
     EXPECT_FALSE(lockstep_options(setup).behaviours.empty()) << name;
   }
+}
+
+TEST(CampaignRuns, ReadersOfFlowWithoutASourceAreRefusedByName) {
+  const auto file = std::filesystem::temp_directory_path() / ("no-flow-" + std::to_string(getpid()) + ".toml");
+  std::ofstream(file) << "[behaviour.flow_field]\nenabled = false\n";
+  try {
+    load_mission("wall", 1, {file.string()});
+    ADD_FAILURE();
+  } catch (const std::exception& e) {
+    EXPECT_NE(std::string(e.what()).find("odometry"), std::string::npos) << e.what();
+  }
+  std::filesystem::remove(file);
+}
+
+/// The corridor's bars can fail: without the behaviours that steer, a start askew ends at a wall or swings wide.
+TEST(CampaignRuns, WithoutSteeringTheCorridorsBarsAreMissed) {
+  const auto file = std::filesystem::temp_directory_path() / ("no-steer-" + std::to_string(getpid()) + ".toml");
+  std::ofstream(file) << "[behaviour.flow_balance]\nheading_weight = 0.0\n[behaviour.obstacle_depth]\nheading_weight = 0.0\n";
+  CampaignOptions options{"corridor-empty", 1, 501, 1, {file.string()}};
+  EXPECT_FALSE(fly_campaign(options, {}).passed());
+  std::filesystem::remove(file);
+}
+
+TEST(CampaignRuns, PeopleWalkByTheSameClockForTheRendererAndTheProbe) {
+  MissionSetup setup = load_mission("corridor", 5);
+  setup.flight.control.mission.legs[1].seconds = 3;
+  (void)fly_once(setup, [&](const FlightTrace& trace, const WorldProbe&) {
+    ASSERT_NE(trace.lift_off_ns, kNever);
+    for (const Truth& t : trace.truth) {
+      if (t.flight_time_s <= 0) continue;
+      ASSERT_NEAR(trace.seconds(t.exposed_at_ns), static_cast<double>(t.flight_time_s), 1e-3);
+    }
+  });
 }
 
 TEST(CampaignRuns, TheTableHasALineForEachFlightAndNamesWhatFailed) {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "control/mission.h"
 #include "missions/measures.h"
 #include "vision/heading_rate.h"
 
@@ -48,6 +49,59 @@ TEST(Judge, WithoutABarAFigureIsReportedOnly) {
   const auto result = verdict(judge(Over::kMean, true, kNan), runs({3}))[0];
   EXPECT_EQ(result.bar, "");
   EXPECT_TRUE(result.ok);
+}
+
+TEST(Judge, WhatNoFlightTellsIsLeftOutWhereThatIsAllowed) {
+  Judge j = judge(Over::kWorstHigh, true, 1);
+  j.bars[0].if_told = true;
+  EXPECT_TRUE(verdict(j, {Measures{}}).empty());
+  EXPECT_FALSE(verdict(j, runs({2})).front().ok);
+}
+
+TEST(Judge, AMissionWithoutARowMustBeFlownToItsEnd) {
+  const Judge& j = judge_of("somebody's own");
+  EXPECT_FALSE(verdict(j, {{{"flown to its end", 0}}})[0].ok);
+  EXPECT_TRUE(verdict(j, {{{"flown to its end", 1}}})[0].ok);
+}
+
+/// A flight that came to its end, at this height.
+FlightTrace at_height(float height_m) {
+  FlightTrace trace;
+  for (int i = 0; i < 100; ++i) {
+    Truth t;
+    t.exposed_at_ns = i * 50 * kMillisecond;
+    t.height_m = height_m;
+    t.flight_time_s = 0.05f * static_cast<float>(i);
+    trace.truth.push_back(t);
+    Command c;
+    c.due_at_ns = t.exposed_at_ns;
+    c.mission_phase = static_cast<std::uint8_t>(i < 90 ? control::MissionPhase::kLeg0 : control::MissionPhase::kDone);
+    trace.commands.push_back(c);
+  }
+  return trace;
+}
+
+TEST(Measures, AVehicleThatStaysOnTheGroundHasNotFlown) {
+  EXPECT_EQ(flown_to_its_end(at_height(1.f)), 1);
+  EXPECT_EQ(flown_to_its_end(at_height(0.2f)), 0);
+  EXPECT_EQ(flown_to_its_end(FlightTrace{}), 0);
+}
+
+TEST(Measures, AnAvoidBeforeTheApproachIsNoDetection) {
+  const MissionSetup setup = load_mission("wall", 1);
+  WorldProbe probe(setup);
+  FlightTrace trace = at_height(1.2f);
+  trace.lift_off_ns = 0;
+  trace.commands[20].avoid = 1;  // in the hover leg
+  const Measures m = measure_wall(trace, setup, probe);
+  EXPECT_TRUE(std::isnan(value_of(m, "frames from avoid to impact")));
+  EXPECT_EQ(value_of(m, "ticks with avoid before the approach"), 1);
+}
+
+TEST(Measures, WithoutALookThereAreNotZeroCollisions) {
+  const MissionSetup setup = load_mission("wall", 1);
+  WorldProbe probe(setup);
+  EXPECT_TRUE(std::isnan(value_of(measure_wall(FlightTrace{}, setup, probe), "collisions")));
 }
 
 /// A flight whose camera sees a yaw rate `scale` times the gyro's.
