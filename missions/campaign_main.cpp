@@ -34,7 +34,7 @@ std::optional<int> parse(int argc, char** argv, Options& o) {
   app.add_option("MISSION", o.campaign.mission, "a folder of config/missions; --list names them");
   app.add_option("--runs", o.campaign.runs, "flights")->check(CLI::Range(1, 1'000'000));
   app.add_option("--seed", o.campaign.first_seed, "of the first flight; each further one has the next");
-  app.add_option("--only", o.only_seed, "fly this seed alone, the same to the bit as in a campaign; with --out its trace is kept too");
+  app.add_option("--only", o.only_seed, "fly this seed alone, the same to the bit as in a campaign; with --out its trace and cues are kept too");
   app.add_option("--jobs", o.campaign.jobs, "threads")->check(CLI::Range(1, 256));
   app.add_option("--config", o.campaign.configs, "further flight configuration, read last")->check(CLI::ExistingFile);
   app.add_option("--out", o.out, "folder for runs.csv and figures (default: none is written)");
@@ -81,7 +81,9 @@ int run(const Options& o) {
   RunFigures figures(o.campaign.mission);
   const CampaignResult result = fly_campaign(o.campaign, progress, [&](std::uint32_t seed, const FlightTrace& trace, const WorldProbe& probe) {
     if (!o.out.empty()) figures.add(seed, trace, probe);
-    if (!o.out.empty() && o.only_seed) write_trace_csv(trace, o.out / fmt::format("trace-{}.csv", seed));
+    if (o.out.empty() || !o.only_seed) return;
+    write_trace_csv(trace, probe, o.out / fmt::format("trace-{}.csv", seed));
+    write_cues_csv(trace, o.out / fmt::format("cues-{}.csv", seed));
   });
   print_results(result, o.json);
   if (!o.out.empty()) {

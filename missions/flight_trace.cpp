@@ -8,7 +8,9 @@
 #include <stdexcept>
 
 #include "control/mission.h"
+#include "missions/world_probe.h"
 #include "sim/lockstep.h"
+#include "tools/csv_rows.h"
 #include "tools/csv_table.h"
 #include "types/frames.h"
 
@@ -187,20 +189,29 @@ TruthEuler euler_of(const Truth& t) {
   return {static_cast<double>(e.roll_rad), static_cast<double>(e.pitch_rad), static_cast<double>(e.yaw_rad)};
 }
 
-void write_trace_csv(const FlightTrace& trace, const fs::path& file) {
+void write_trace_csv(const FlightTrace& trace, const WorldProbe& probe, const fs::path& file) {
   std::ofstream out(file);
   out << "t_s,north_m,east_m,height_m,roll_rad,pitch_rad,yaw_rad,forward_mps,setpoint_m,estimate_m,velocity_forward_mps,"
-         "velocity_right_mps,yaw_rate_radps,avoid,mode,phase\n";
+         "velocity_right_mps,yaw_rate_radps,avoid,mode,phase,world_north_m,world_east_m\n";
   for (const Command& c : trace.commands) {
     const Truth& t = trace.truth_at(c.due_at_ns);
     const TruthEuler e = euler_of(t);
+    const Vec3 at = probe.in_world(t);
     const double forward = static_cast<double>(t.velocity_ned_mps[0]) * std::cos(e.yaw_rad) +
                            static_cast<double>(t.velocity_ned_mps[1]) * std::sin(e.yaw_rad);
-    out << fmt::format("{:.3f},{:.4f},{:.4f},{:.4f},{:.5f},{:.5f},{:.5f},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{},{},{}\n",
+    out << fmt::format("{:.3f},{:.4f},{:.4f},{:.4f},{:.5f},{:.5f},{:.5f},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{},{},{},{:.4f},{:.4f}\n",
                        trace.seconds(c.due_at_ns), t.position_ned_m[0], t.position_ned_m[1], t.height_m, e.roll_rad,
                        e.pitch_rad, e.yaw_rad, forward, c.height_setpoint_m, c.height_m, c.velocity_forward_mps,
-                       c.velocity_right_mps, c.yaw_rate_radps, c.avoid, static_cast<int>(c.mode), c.mission_phase);
+                       c.velocity_right_mps, c.yaw_rate_radps, c.avoid, static_cast<int>(c.mode), c.mission_phase, at.x(), at.y());
   }
+  if (!out.flush()) throw std::runtime_error("cannot write " + file.string());
+}
+
+void write_cues_csv(const FlightTrace& trace, const fs::path& file) {
+  std::ofstream out(file);
+  out << tools::cue_columns() << '\n';
+  for (const auto& [name, cues] : trace.cues)
+    for (const Cue& c : cues) out << tools::csv_row(c, {}, name) << '\n';
   if (!out.flush()) throw std::runtime_error("cannot write " + file.string());
 }
 

@@ -15,6 +15,8 @@ struct LockstepLog;
 
 namespace wasp::missions {
 
+class WorldProbe;
+
 struct FlightTrace {
   std::vector<Truth> truth;       ///< 20 Hz from lockstep, 200 Hz from logs
   std::vector<Command> commands;  ///< one a control tick
@@ -36,8 +38,12 @@ FlightTrace trace_of(sim::LockstepLog log, const std::vector<std::string>& names
 /// is missing.
 FlightTrace read_trace(const std::filesystem::path& log_folder);
 
-/// One line a control tick: time since lift-off, where the vehicle was and what it was told. Throws naming the file.
-void write_trace_csv(const FlightTrace& trace, const std::filesystem::path& file);
+/// One line a control tick: time since lift-off, where the vehicle was (in the flight's frame
+/// and in the world's) and what it was told. Throws naming the file.
+void write_trace_csv(const FlightTrace& trace, const WorldProbe& probe, const std::filesystem::path& file);
+
+/// Every cue, in the columns of wasp-record's cues.csv. Throws naming the file.
+void write_cues_csv(const FlightTrace& trace, const std::filesystem::path& file);
 
 /// Roll, pitch and heading of a truth sample [rad].
 struct TruthEuler {
