@@ -16,7 +16,6 @@ void note_evidence(Intention& intention, const Cue& cue, const ArbiterRow& row) 
     intention.oldest_exposed_at_ns = cue.exposed_at_ns;
 }
 
-
 /// Keeps the first source in rank order; one over its budget stands behind every punctual one.
 struct Choice {
   int source = -1, rank = 0;
@@ -64,8 +63,8 @@ Intention arbitrate(const ArbiterParams& params, const CueSet& set, TimeNs now_n
     add_wishes(cue, row, out);
   }
   for (const int source : {height.source, velocity.source, climb.source})
-    if (source >= 0) note_evidence(out, set.cues[static_cast<std::size_t>(source)],
-                                   params.rows[static_cast<std::size_t>(source)]);
+    if (source >= 0)
+      note_evidence(out, set.cues[static_cast<std::size_t>(source)], params.rows[static_cast<std::size_t>(source)]);
   if ((out.height_source = height.source) >= 0) {
     const Cue& cue = set.cues[static_cast<std::size_t>(height.source)];
     out.height_m = cue.body.height_m, out.height_sigma_m = cue.body.height_sigma_m;

@@ -1,7 +1,7 @@
 // The arbiter turns the newest cue of every behaviour into one intention. A cue older than its age limit is absent.
-// Avoid wins over everything else a behaviour says; heading and pitch are weighted sums; height, velocity and the wish to
-// climb each come from the first source in their fallback order that can see; one that is at this moment over its time
-// budget is asked last. Above all of it stands manual control: see control/flight_mode.h. Why: docs/behaviours.md.
+// Avoid wins over everything else a behaviour says; heading and pitch are weighted sums; height, velocity and the wish
+// to climb each come from the first source in their fallback order that can see; one that is at this moment over its
+// time budget is asked last. Above all of it stands manual control: see control/flight_mode.h. Why: docs/behaviours.md.
 #pragma once
 
 #include <array>

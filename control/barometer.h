@@ -1,5 +1,5 @@
-// Height from air pressure: the last resort among the height sources, because weather and rotor wash move it. Its zero is
-// learned while something sees the ground; before that it is where the vehicle stands.
+// Height from air pressure: the last resort among the height sources, because weather and rotor wash move it. Its zero
+// is learned while something sees the ground; before that it is where the vehicle stands.
 #pragma once
 
 #include "types/realtime.h"

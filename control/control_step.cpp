@@ -61,8 +61,8 @@ bool estimate(const ControlParams& p, const ControlInput& in, const Intention& i
             intention.velocity_exposed_at_ns, in.now_ns, s.velocity);
   const bool seen = intention.height_source >= 0;
   float barometric_m = 0;
-  const bool pressed =
-      barometer_step(p.barometer, in.pressure_hpa, !in.autopilot.armed, seen, intention.height_m, s.barometer, barometric_m);
+  const bool pressed = barometer_step(p.barometer, in.pressure_hpa, !in.autopilot.armed, seen, intention.height_m,
+                                      s.barometer, barometric_m);
   if (seen)
     correct(p.height_filter, intention.height_m, intention.height_exposed_at_ns, in.now_ns, s.height);
   else if (pressed)
@@ -75,11 +75,13 @@ bool estimate(const ControlParams& p, const ControlInput& in, const Intention& i
 float target_height(const ControlParams& p, const Intention& intention, const MissionWish& wish, float dt_s,
                     const ControlState& s) noexcept {
   if (!wish.behaviours_climb || !s.altitude_hold.engaged) return wish.target_m;
-  const float climb_mps = intention.climb_source >= 0 ? intention.climb_mps + intention.climb_1ps * s.height.height_m : 0.f;
+  const float climb_mps =
+      intention.climb_source >= 0 ? intention.climb_mps + intention.climb_1ps * s.height.height_m : 0.f;
   return std::clamp(s.altitude_hold.setpoint_m + climb_mps * dt_s, p.min_height_m, p.max_height_m);
 }
 
-/// Yaw rate: the behaviours' sum and the sticks; while there is neither, back to the heading held, if one is to be held.
+/// Yaw rate: the behaviours' sum and the sticks; while there is neither, back to the heading held, if one is to be
+/// held.
 float wanted_yaw_rate(const ControlParams& p, const ControlInput& in, const Intention& intention,
                       const MissionWish& wish, ControlState& s) noexcept {
   const float asked = (wish.steer ? intention.heading_rate_radps : 0.f) + wish.yaw_rate_radps;
@@ -112,7 +114,8 @@ Setpoint wanted_setpoint(const ControlParams& p, const ControlInput& in, const I
     return wanted;
   }
   const bool moving = known(p.velocity_filter, s.velocity, in.now_ns);
-  const Tilt tilt = velocity_hold_step(p.velocity_hold, forward_mps, moving, s.velocity.velocity_mps, in.dt_s, s.velocity_hold);
+  const Tilt tilt =
+      velocity_hold_step(p.velocity_hold, forward_mps, moving, s.velocity.velocity_mps, in.dt_s, s.velocity_hold);
   const float pitch_wish = wish.steer ? intention.pitch_rad : 0.f;
   const bool avoiding = intention.avoid || (s.avoid_until_ns != kNever && in.now_ns < s.avoid_until_ns);
   wanted.roll_rad = tilt.roll_rad + wish.roll_rad;
@@ -193,8 +196,8 @@ ControlOutput control_step(const ControlParams& p, const ControlInput& in, Contr
   const bool height_seen = estimate(p, in, intention, s);
   const MissionWish wish =
       mission_step(p.mission,
-                   {in.now_ns, in.autopilot.armed, in.autopilot.follows, height_seen,
-                    s.height.height_m, s.height.climb_rate_mps, in.stop_requested, in.autopilot.heard_at_ns != kNever},
+                   {in.now_ns, in.autopilot.armed, in.autopilot.follows, height_seen, s.height.height_m,
+                    s.height.climb_rate_mps, in.stop_requested, in.autopilot.heard_at_ns != kNever},
                    s.mission);
   const Setpoint wanted = wanted_setpoint(p, in, intention, wish, s);
   s.sent_before = s.sent;

@@ -29,10 +29,10 @@ struct ControlParams {
   DurationNs attitude_age_limit_ns = 200 * kMillisecond;
   DurationNs link_age_limit_ns = 300 * kMillisecond;  ///< silence after which the link counts as lost
   DurationNs ground_hold_limit_ns = 1 * kSecond;      ///< how long to hold on the accelerometer alone
-  float avoid_hold_s = 3.f;    ///< forward speed stays zero this long after avoid was raised
-  bool hold_heading = false;   ///< while nobody steers, keep the heading of the moment nobody began to
+  float avoid_hold_s = 3.f;                           ///< forward speed stays zero this long after avoid was raised
+  bool hold_heading = false;  ///< while nobody steers, keep the heading of the moment nobody began to
   float min_height_m = 0.3f, max_height_m = 4.f;  ///< where behaviours may climb and sink to
-  float failsafe_thrust_share = 0.96f;                ///< of hover thrust: a gentle descent
+  float failsafe_thrust_share = 0.96f;            ///< of hover thrust: a gentle descent
   FailsafeAction failsafe_action = FailsafeAction::kDescend;
 };
 
