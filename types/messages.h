@@ -143,7 +143,7 @@ struct Truth {
   std::array<float, 3> velocity_ned_mps{};
   std::array<float, 4> q_ned_body{1, 0, 0, 0};
   std::array<float, 3> rate_body_radps{};
-  float height_m = 0;  ///< of the vehicle's reference point (camera) above what is below it
+  float height_m = 0;  ///< of the camera above the plane z = 0 of the world, whatever is below it
   float armed = 0;
 };
 
