@@ -60,13 +60,11 @@ bool estimate(const ControlParams& p, const ControlInput& in, const Intention& i
     correct(p.velocity_filter, {intention.velocity_forward_mps, intention.velocity_right_mps},
             intention.velocity_exposed_at_ns, in.now_ns, s.velocity);
   const bool seen = intention.height_source >= 0;
+  if (seen) correct(p.height_filter, intention.height_m, intention.height_exposed_at_ns, in.now_ns, s.height);
   float barometric_m = 0;
-  const bool pressed = barometer_step(p.barometer, in.pressure_hpa, !in.autopilot.armed, seen, intention.height_m,
+  const bool pressed = barometer_step(p.barometer, in.pressure_hpa, !in.autopilot.armed, seen, s.height.height_m,
                                       s.barometer, barometric_m);
-  if (seen)
-    correct(p.height_filter, intention.height_m, intention.height_exposed_at_ns, in.now_ns, s.height);
-  else if (pressed)
-    correct(p.height_filter, barometric_m, in.now_ns, in.now_ns, s.height);
+  if (!seen && pressed) correct(p.height_filter, barometric_m, in.now_ns, in.now_ns, s.height);
   if (seen || pressed) s.ground_seen_at_ns = in.now_ns;
   return seen || pressed;
 }

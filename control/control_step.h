@@ -51,7 +51,7 @@ struct ControlInput {
   AttitudeSample attitude;
   bool accel_present = false;
   std::array<float, 3> accel_body_mps2{};  ///< mean specific force since the last tick
-  float pressure_hpa = 0;                  ///< mean since the last tick; 0: none came
+  float pressure_hpa = 0;                  ///< mean of those since the last tick; 0: none came
   AutopilotState autopilot;
   bool stop_requested = false;
   bool deadlines_missed = false;  ///< the last two ticks

@@ -17,7 +17,7 @@ enum class Finiteness : std::uint8_t {
 };
 
 /// Bits of ImuSample::fields (HIGHRES_IMU fields_updated).
-inline constexpr std::uint32_t kFieldAccel = 0x007, kFieldGyro = 0x038, kFieldMag = 0x1C0, kFieldPressure = 0x200,
+inline constexpr std::uint32_t kFieldAccel = 0x007, kFieldGyro = 0x038, kFieldMag = 0x1C0, kFieldPressure = kImuHasPressure,
                                kFieldTemperature = 0x1000;
 
 Finiteness convert(const mavlink::HighresImu& from, ImuSample& to) WASP_REALTIME;

@@ -108,7 +108,7 @@ class Lockstep {
   std::deque<Cue> pending_;
   LockstepLog log_;
   std::array<double, 3> accel_sum_{};
-  double pressure_sum_ = 0;
+  control::PressureMean pressure_;
   int accel_count_ = 0;
   std::uint32_t frame_ = 0, down_frame_ = 0;
   TimeNs request_due_ns_ = 0, timesync_due_ns_ = 0;

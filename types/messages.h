@@ -36,6 +36,7 @@ struct ImuSample {
   std::uint32_t reserved = 0;
 };
 static_assert(sizeof(ImuSample) == 64);
+inline constexpr std::uint32_t kImuHasPressure = 0x200;  ///< bit of ImuSample::fields: abs_pressure
 
 /// Attitude as the autopilot estimates it, 64 bytes.
 struct AttitudeSample {
