@@ -51,14 +51,39 @@ LevelVelocity accel_level(const ControlInput& in) noexcept {
   return {level.x(), level.y()};
 }
 
+void estimate_velocity(const ControlParams& p, const ControlInput& in, const Intention& intention,
+                       ControlState& s) noexcept {
+  predict(p.velocity_filter, accel_level(in), in.attitude_present ? in.attitude.rate_body_radps[2] : 0.f, in.now_ns,
+          s.velocity);
+  if (intention.velocity_source < 0) return;
+  correct(p.velocity_filter, {intention.velocity_forward_mps, intention.velocity_right_mps},
+          intention.velocity_exposed_at_ns, in.now_ns, s.velocity);
+  if (s.velocity.last_exposed_at_ns != intention.velocity_exposed_at_ns) return;  // not newer than what it rests on
+  const ArbiterRow& row = p.arbiter.rows[static_cast<std::size_t>(intention.velocity_source)];
+  s.velocity_until_ns = s.velocity.last_exposed_at_ns + std::min(row.age_limit_ns, p.velocity_filter.max_age_ns);
+}
+
+/// The velocity is known while neither the filter nor the arbiter finds the last cue of it too old.
+bool velocity_known(const ControlParams& p, const ControlInput& in, const ControlState& s) noexcept {
+  return known(p.velocity_filter, s.velocity, in.now_ns) && in.now_ns <= s.velocity_until_ns;
+}
+
+bool velocity_held(const ControlParams& p, const ControlInput& in, const ControlState& s) noexcept {
+  return p.velocity_hold.hold != VelocityHold::kOff && velocity_known(p, in, s);
+}
+
+/// The velocity held rests on a cue that may be gone by now: its age counts all the same.
+void rest_on_velocity(const ControlState& s, Intention& intention) noexcept {
+  const TimeNs exposed_at_ns = s.velocity.last_exposed_at_ns;
+  intention.usable_until_ns = std::min(intention.usable_until_ns, s.velocity_until_ns);
+  if (intention.oldest_exposed_at_ns == kNever || exposed_at_ns < intention.oldest_exposed_at_ns)
+    intention.oldest_exposed_at_ns = exposed_at_ns;
+}
+
 /// Carries height and velocity forward and corrects them by what was seen. True if a height is known now.
 bool estimate(const ControlParams& p, const ControlInput& in, const Intention& intention, ControlState& s) noexcept {
   predict(p.height_filter, accel_up(in), in.now_ns, s.height);
-  predict(p.velocity_filter, accel_level(in), in.attitude_present ? in.attitude.rate_body_radps[2] : 0.f, in.now_ns,
-          s.velocity);
-  if (intention.velocity_source >= 0)
-    correct(p.velocity_filter, {intention.velocity_forward_mps, intention.velocity_right_mps},
-            intention.velocity_exposed_at_ns, in.now_ns, s.velocity);
+  estimate_velocity(p, in, intention, s);
   const bool seen = intention.height_source >= 0;
   if (seen) correct(p.height_filter, intention.height_m, intention.height_exposed_at_ns, in.now_ns, s.height);
   float barometric_m = 0;
@@ -111,7 +136,7 @@ Setpoint wanted_setpoint(const ControlParams& p, const ControlInput& in, const I
     s.velocity_hold = VelocityHoldState{};
     return wanted;
   }
-  const bool moving = known(p.velocity_filter, s.velocity, in.now_ns);
+  const bool moving = velocity_known(p, in, s);
   const Tilt tilt =
       velocity_hold_step(p.velocity_hold, forward_mps, moving, s.velocity.velocity_mps, in.dt_s, s.velocity_hold);
   const float pitch_wish = wish.steer ? intention.pitch_rad : 0.f;
@@ -190,8 +215,9 @@ void refuse(const ControlParams& p, const ControlInput& in, Refusal refusal, Con
 }
 
 ControlOutput control_step(const ControlParams& p, const ControlInput& in, ControlState& s) noexcept {
-  const Intention intention = arbitrate(p.arbiter, in.cues, in.now_ns);
+  Intention intention = arbitrate(p.arbiter, in.cues, in.now_ns);
   const bool height_seen = estimate(p, in, intention, s);
+  if (velocity_held(p, in, s)) rest_on_velocity(s, intention);
   const MissionWish wish =
       mission_step(p.mission,
                    {in.now_ns, in.autopilot.armed, in.autopilot.follows, height_seen, s.height.height_m,
@@ -214,10 +240,10 @@ ControlOutput control_step(const ControlParams& p, const ControlInput& in, Contr
   c.height_setpoint_m = wish.rotors ? s.altitude_hold.setpoint_m : 0.f;
   c.height_m = s.height.height_m;
   c.climb_rate_mps = s.height.climb_rate_mps;
-  if (known(p.velocity_filter, s.velocity, in.now_ns)) {
+  if (velocity_known(p, in, s)) {
     c.velocity_forward_mps = s.velocity.velocity_mps.forward;
     c.velocity_right_mps = s.velocity.velocity_mps.right;
-    c.velocity_held = p.velocity_hold.hold != VelocityHold::kOff ? 1 : 0;
+    c.velocity_held = velocity_held(p, in, s) ? 1 : 0;
   }
   c.avoid = intention.avoid ? 1 : 0;
   c.mission_phase = static_cast<std::uint8_t>(s.mission.phase);

@@ -62,6 +62,7 @@ struct ControlState {
   AltitudeHoldState altitude_hold;
   BarometerState barometer;
   VelocityFilterState velocity;
+  TimeNs velocity_until_ns = kNever;  ///< the cue that `velocity` rests on reaches its age limit
   VelocityHoldState velocity_hold;
   TimeNs avoid_until_ns = kNever;
   float held_yaw_rad = 0;

@@ -120,6 +120,71 @@ TEST(ControlStep, HoldAndFailsafeRestOnNoCue) {
   EXPECT_NE(out.attitude_until_ns, kForever);
 }
 
+/// Holds the velocity of behaviour 1, whose cues live 100 ms; the last one says 1 m/s forward and is `age_ns` old.
+ControlOutput with_velocity_aged(DurationNs age_ns, ControlInput& in, ControlState& state) {
+  ControlParams p = params();
+  p.arbiter.rows[1].velocity_rank = 0;
+  p.arbiter.rows[1].age_limit_ns = 100 * kMillisecond;
+  p.velocity_hold.hold = VelocityHold::kBoth;
+  in_flight(p, in, state);
+  in.cues.present[1] = true;
+  Cue& cue = in.cues.cues[1];
+  cue.body.validity = Validity::kValid;
+  cue.body.has_velocity = 1;
+  cue.body.velocity_forward_mps = 1.f;
+  const auto tick = [&] {
+    in.now_ns += 10 * kMillisecond;
+    in.cues.cues[0].exposed_at_ns = in.attitude.exposed_at_ns = in.autopilot.heard_at_ns = in.now_ns;
+    return control_step(p, in, state);
+  };
+  for (int i = 0; i < 30; ++i) {
+    cue.exposed_at_ns = in.now_ns;
+    tick();
+  }
+  ControlOutput out;
+  while (in.now_ns - cue.exposed_at_ns < age_ns) out = tick();
+  return out;
+}
+
+TEST(ControlStep, AVelocityIsHeldNoLongerThanItsSourceMayBeUsed) {
+  ControlInput in;
+  ControlState state;
+  const ControlOutput fresh = with_velocity_aged(90 * kMillisecond, in, state);
+  EXPECT_EQ(fresh.command.velocity_held, 1);
+  EXPECT_GT(fresh.command.q_ned_body[2], 0.03f);  // brakes
+  ControlInput later;
+  ControlState old;
+  const ControlOutput out = with_velocity_aged(150 * kMillisecond, later, old);
+  EXPECT_EQ(out.command.mode, FlightMode::kBehaviour);
+  EXPECT_EQ(out.command.velocity_held, 0);
+  EXPECT_EQ(out.command.velocity_forward_mps, 0.f);
+  EXPECT_LT(out.command.q_ned_body[2], fresh.command.q_ned_body[2]);
+  EXPECT_NEAR(out.command.q_ned_body[2], 0.f, 1e-3f);  // level
+  EXPECT_NEAR(out.command.q_ned_body[1], 0.f, 1e-3f);
+}
+
+TEST(ControlStep, AHeldVelocitysAgeIsAskedAgainRightBeforeTheWriteThoughItsSourceIsBlindByNow) {
+  ControlInput in;
+  ControlState state;
+  with_velocity_aged(50 * kMillisecond, in, state);
+  ControlParams p = params();
+  p.arbiter.rows[1].velocity_rank = 0;
+  p.arbiter.rows[1].heading_weight = p.arbiter.rows[1].pitch_weight = 0;
+  p.velocity_hold.hold = VelocityHold::kBoth;
+  in.cues.cues[1].body.validity = Validity::kBlind;
+  in.now_ns += 10 * kMillisecond;
+  in.cues.cues[0].exposed_at_ns = in.attitude.exposed_at_ns = in.now_ns;
+  const ControlOutput out = control_step(p, in, state);
+  ASSERT_EQ(out.command.velocity_held, 1);
+  EXPECT_EQ(out.cue_until_ns, in.cues.cues[1].exposed_at_ns + 100 * kMillisecond);
+  EXPECT_EQ(out.command.exposed_at_ns, in.cues.cues[1].exposed_at_ns);
+  EXPECT_EQ(refusal_at(out, out.cue_until_ns), Refusal::kNone);
+  EXPECT_EQ(refusal_at(out, out.cue_until_ns + 1), Refusal::kCueTooOld);
+  p.velocity_hold.hold = VelocityHold::kOff;  // not rested on: the height's age alone counts
+  ControlState other = state;
+  EXPECT_EQ(control_step(p, in, other).cue_until_ns, in.cues.cues[0].exposed_at_ns + p.arbiter.rows[0].age_limit_ns);
+}
+
 TEST(ControlStep, NothingIsSentBeforeTheAutopilotWasHeard) {
   ControlState state;
   ControlInput in = good_input(50 * kMillisecond);
