@@ -126,6 +126,14 @@ float wanted_speed(const ControlParams& p, const ControlInput& in, const Intenti
   return s.avoid_until_ns != kNever && in.now_ns < s.avoid_until_ns ? 0.f : wish.forward_mps;
 }
 
+/// While somebody else had the vehicle nothing may be held from before: holds begin where it is now.
+void forget_holds(FlightMode last_mode, ControlState& s) noexcept {
+  if (last_mode != FlightMode::kManual && last_mode != FlightMode::kFailsafe && last_mode != FlightMode::kDisarmed)
+    return;
+  s.altitude_hold.engaged = s.holding_yaw = false;
+  s.velocity_hold = VelocityHoldState{};
+}
+
 /// What behaviours and mission together want, before limits and mode.
 Setpoint wanted_setpoint(const ControlParams& p, const ControlInput& in, const Intention& intention,
                          const MissionWish& wish, ControlState& s) noexcept {
@@ -216,6 +224,7 @@ void refuse(const ControlParams& p, const ControlInput& in, Refusal refusal, Con
 
 ControlOutput control_step(const ControlParams& p, const ControlInput& in, ControlState& s) noexcept {
   Intention intention = arbitrate(p.arbiter, in.cues, in.now_ns);
+  forget_holds(s.mode.mode, s);
   const bool height_seen = estimate(p, in, intention, s);
   if (velocity_held(p, in, s)) rest_on_velocity(s, intention);
   const MissionWish wish =

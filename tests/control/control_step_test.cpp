@@ -185,6 +185,61 @@ TEST(ControlStep, AHeldVelocitysAgeIsAskedAgainRightBeforeTheWriteThoughItsSourc
   EXPECT_EQ(control_step(p, in, other).cue_until_ns, in.cues.cues[0].exposed_at_ns + p.arbiter.rows[0].age_limit_ns);
 }
 
+TEST(ControlStep, NothingIsHeldFromTheTimeInWhichThePilotFlew) {
+  ControlParams p = params();
+  p.arbiter.rows[1] = {.velocity_rank = 0, .climb_rank = 0};
+  p.velocity_hold.hold = VelocityHold::kBoth;
+  p.hold_heading = true;
+  p.mission.legs[0].behaviours_climb = true;
+  p.mission.legs[0].forward_mps = 2.f;
+  ControlInput in;
+  ControlState state;
+  in_flight(p, in, state);
+  const auto tick = [&](TimeNs now_ns, bool follows, float yaw_rad) {
+    in = good_input(now_ns);
+    in.autopilot.follows = follows;
+    in.attitude.q_ned_body = {std::cos(yaw_rad / 2), 0, 0, std::sin(yaw_rad / 2)};
+    in.cues.present[1] = true;
+    Cue& cue = in.cues.cues[1];
+    cue.exposed_at_ns = in.now_ns - 40 * kMillisecond;
+    cue.body.validity = Validity::kValid;
+    cue.body.has_climb = cue.body.has_velocity = 1;
+    cue.body.climb_mps = 1.f;
+    return control_step(p, in, state);
+  };
+  TimeNs t = in.now_ns;
+  for (int i = 0; i < 20; ++i) tick(t += 50 * kMillisecond, true, 0.f);
+  ASSERT_GT(state.altitude_hold.setpoint_m, 0.7f);  // in wasp's hands the wish moves the setpoint
+  ASSERT_GT(state.velocity_hold.integral_mps2.forward, 0.1f);
+  for (int i = 0; i < 200; ++i) {
+    const ControlOutput out = tick(t += 50 * kMillisecond, false, 1.f);
+    ASSERT_EQ(out.command.mode, FlightMode::kManual);
+  }
+  const ControlOutput out = tick(t += 50 * kMillisecond, true, 1.f);
+  EXPECT_EQ(out.command.mode, FlightMode::kBehaviour);
+  EXPECT_LT(std::fabs(out.command.height_setpoint_m - out.command.height_m), 0.1f);
+  EXPECT_LT(std::fabs(state.altitude_hold.pid.integral), 0.01f);
+  EXPECT_LT(state.velocity_hold.integral_mps2.forward, 0.01f);
+  EXPECT_LT(state.velocity_hold.setpoint_mps, 0.05f);
+  EXPECT_NEAR(out.command.yaw_rate_radps, 0.f, 1e-3f);  // not back to the heading of before
+}
+
+TEST(ControlStep, AFailsafeLeavesNoHoldBehind) {
+  const ControlParams p = params();
+  ControlInput in;
+  ControlState state;
+  in_flight(p, in, state);
+  state.altitude_hold.setpoint_m = 3.f;
+  for (const bool attitude : {false, true}) {
+    in.now_ns += 50 * kMillisecond;
+    in.cues.cues[0].exposed_at_ns = in.attitude.exposed_at_ns = in.autopilot.heard_at_ns = in.now_ns;
+    in.attitude_present = attitude;
+    control_step(p, in, state);
+    EXPECT_EQ(state.mode.mode, attitude ? FlightMode::kBehaviour : FlightMode::kFailsafe);
+  }
+  EXPECT_LT(std::fabs(state.altitude_hold.setpoint_m - state.height.height_m), 0.1f);
+}
+
 TEST(ControlStep, NothingIsSentBeforeTheAutopilotWasHeard) {
   ControlState state;
   ControlInput in = good_input(50 * kMillisecond);
