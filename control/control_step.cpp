@@ -119,38 +119,61 @@ float wanted_yaw_rate(const ControlParams& p, const ControlInput& in, const Inte
   return kHeadingGain_1ps * std::remainder(s.held_yaw_rad - yaw_rad, 2 * std::numbers::pi_v<float>);
 }
 
-/// Forward speed: the leg's, but zero from an avoid on until its hold time is over. Avoid wins over everything.
-float wanted_speed(const ControlParams& p, const ControlInput& in, const Intention& intention, const MissionWish& wish,
-                   ControlState& s) noexcept {
-  if (intention.avoid) s.avoid_until_ns = in.now_ns + from_seconds(static_cast<double>(p.avoid_hold_s));
-  return s.avoid_until_ns != kNever && in.now_ns < s.avoid_until_ns ? 0.f : wish.forward_mps;
+constexpr DurationNs kLongestBrake = 1 * kSecond;  // blind: any longer and a vehicle that stood would back away
+
+/// Notes an avoid. One that comes back before it was away for the hold time, or for a brake's length, is no new one.
+void hear_avoid(const ControlParams& p, const ControlInput& in, const Intention& intention, ControlState& s) noexcept {
+  if (!intention.avoid) return;
+  const DurationNs away_ns = std::max(from_seconds(static_cast<double>(p.avoid_hold_s)), kLongestBrake);
+  if (s.avoid_raised_at_ns == kNever || in.now_ns - s.avoid_heard_at_ns >= away_ns) s.avoid_raised_at_ns = in.now_ns;
+  s.avoid_heard_at_ns = in.now_ns;
 }
 
-/// While somebody else had the vehicle nothing may be held from before: holds begin where it is now.
+/// From an avoid on until its hold time is over.
+bool avoiding(const ControlParams& p, const ControlInput& in, const ControlState& s) noexcept {
+  if (s.avoid_heard_at_ns == kNever) return false;
+  const DurationNs since_ns = in.now_ns - s.avoid_heard_at_ns;
+  return since_ns <= 0 || since_ns < from_seconds(static_cast<double>(p.avoid_hold_s));
+}
+
+/// Pitch: what holds the velocity, the behaviours' wish and the stick. While avoiding nothing pitches forward, and
+/// where no held velocity brakes, a short nose-up does.
+float wanted_pitch(const ControlParams& p, const ControlInput& in, const Intention& intention, const MissionWish& wish,
+                   float hold_rad, const ControlState& s) noexcept {
+  const float wish_rad = wish.steer ? intention.pitch_rad : 0.f;
+  if (!avoiding(p, in, s)) return hold_rad + wish_rad + wish.pitch_rad;
+  const bool forward_held = p.velocity_hold.hold == VelocityHold::kBoth && velocity_known(p, in, s);
+  const bool brake =
+      wish.steer && !forward_held && s.avoid_raised_at_ns != kNever && in.now_ns - s.avoid_raised_at_ns < kLongestBrake;
+  return hold_rad + std::max({0.f, wish_rad, brake ? p.avoid_brake_rad : 0.f});
+}
+
+/// While somebody else had the vehicle nothing may be held from before: holds begin where it is now. An avoid raised
+/// while the pilot flew brakes from the takeover on.
 void forget_holds(FlightMode last_mode, ControlState& s) noexcept {
   if (last_mode != FlightMode::kManual && last_mode != FlightMode::kFailsafe && last_mode != FlightMode::kDisarmed)
     return;
   s.altitude_hold.engaged = s.holding_yaw = false;
   s.velocity_hold = VelocityHoldState{};
+  if (last_mode == FlightMode::kManual) s.avoid_raised_at_ns = kNever;
 }
 
 /// What behaviours and mission together want, before limits and mode.
 Setpoint wanted_setpoint(const ControlParams& p, const ControlInput& in, const Intention& intention,
                          const MissionWish& wish, ControlState& s) noexcept {
   Setpoint wanted;
-  const float forward_mps = wanted_speed(p, in, intention, wish, s);
+  hear_avoid(p, in, intention, s);
   if (!wish.rotors) {
     s.altitude_hold.engaged = s.holding_yaw = false;
     s.velocity_hold = VelocityHoldState{};
     return wanted;
   }
+  const float forward_mps = avoiding(p, in, s) ? 0.f : wish.forward_mps;
   const bool moving = velocity_known(p, in, s);
   const Tilt tilt =
       velocity_hold_step(p.velocity_hold, forward_mps, moving, s.velocity.velocity_mps, in.dt_s, s.velocity_hold);
-  const float pitch_wish = wish.steer ? intention.pitch_rad : 0.f;
-  const bool avoiding = intention.avoid || (s.avoid_until_ns != kNever && in.now_ns < s.avoid_until_ns);
   wanted.roll_rad = tilt.roll_rad + wish.roll_rad;
-  wanted.pitch_rad = tilt.pitch_rad + (avoiding ? std::fmax(0.f, pitch_wish) : pitch_wish + wish.pitch_rad);
+  wanted.pitch_rad = wanted_pitch(p, in, intention, wish, tilt.pitch_rad, s);
   wanted.yaw_rate_radps = wanted_yaw_rate(p, in, intention, wish, s);
   wanted.thrust = altitude_hold_step(p.altitude_hold, target_height(p, intention, wish, in.dt_s, s), s.height.height_m,
                                      s.height.climb_rate_mps, cos_tilt(in), in.dt_s, s.altitude_hold);

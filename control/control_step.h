@@ -30,6 +30,8 @@ struct ControlParams {
   DurationNs link_age_limit_ns = 300 * kMillisecond;  ///< silence after which the link counts as lost
   DurationNs ground_hold_limit_ns = 1 * kSecond;      ///< how long to hold on the accelerometer alone
   float avoid_hold_s = 3.f;                           ///< forward speed stays zero this long after avoid was raised
+  float avoid_brake_rad =
+      0.0873f;                ///< nose-up for the first second of an avoid where no held velocity brakes; 0: level
   bool hold_heading = false;  ///< while nobody steers, keep the heading of the moment nobody began to
   float min_height_m = 0.3f, max_height_m = 4.f;  ///< where behaviours may climb and sink to
   float failsafe_thrust_share = 0.96f;            ///< of hover thrust: a gentle descent
@@ -64,7 +66,7 @@ struct ControlState {
   VelocityFilterState velocity;
   TimeNs velocity_until_ns = kNever;  ///< the cue that `velocity` rests on reaches its age limit
   VelocityHoldState velocity_hold;
-  TimeNs avoid_until_ns = kNever;
+  TimeNs avoid_raised_at_ns = kNever, avoid_heard_at_ns = kNever;  ///< its first tick and its latest
   float held_yaw_rad = 0;
   bool holding_yaw = false;
   Setpoint sent, sent_before;  ///< of this tick and of the one before

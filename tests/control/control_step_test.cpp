@@ -240,6 +240,103 @@ TEST(ControlStep, AFailsafeLeavesNoHoldBehind) {
   EXPECT_LT(std::fabs(state.altitude_hold.setpoint_m - state.height.height_m), 0.1f);
 }
 
+/// A flight of behaviour 0 at height; behaviour 1 says what the test makes it say.
+struct Avoiding : ::testing::Test {
+  ControlParams p = params();
+  ControlInput in;
+  ControlState state;
+  float velocity_mps = 0;
+  bool velocity_seen = false, avoid = false, follows = true;
+  Avoiding() {
+    p.arbiter.rows[1] = {.velocity_rank = 0, .pitch_weight = 1};
+    p.velocity_hold.hold = VelocityHold::kBoth;
+    p.mission.legs[0].forward_mps = 1.f;
+  }
+  /// Pitch of the setpoint after `seconds` more [rad].
+  float pitch_after(double seconds) {
+    float pitch_rad = 0;
+    for (int i = 0; i < std::lround(seconds / 0.05); ++i) {
+      in = good_input(in.now_ns + 50 * kMillisecond);
+      in.autopilot.follows = follows;
+      in.cues.present[1] = true;
+      Cue& cue = in.cues.cues[1];
+      cue.exposed_at_ns = in.now_ns - 40 * kMillisecond;
+      cue.body.validity = velocity_seen ? Validity::kValid : Validity::kBlind;
+      cue.body.has_velocity = velocity_seen ? 1 : 0;
+      cue.body.velocity_forward_mps = velocity_mps;
+      cue.body.avoid = avoid ? 1 : 0;
+      control_step(p, in, state);
+      pitch_rad = state.sent.pitch_rad;
+    }
+    return pitch_rad;
+  }
+};
+
+TEST_F(Avoiding, WithoutAVelocityPitchesUpForASecondAndIsLevelThen) {
+  in_flight(p, in, state);
+  EXPECT_NEAR(pitch_after(0.5), 0.f, 1e-4f);
+  avoid = true;
+  EXPECT_NEAR(pitch_after(0.2), p.avoid_brake_rad, 1e-4f);
+  EXPECT_NEAR(pitch_after(0.8), p.avoid_brake_rad, 1e-4f);
+  EXPECT_NEAR(pitch_after(0.2), 0.f, 1e-4f);
+  EXPECT_NEAR(pitch_after(20.), 0.f, 1e-4f);  // still raised: never again backwards
+  avoid = false;
+  pitch_after(static_cast<double>(p.avoid_hold_s) + 0.1);
+  avoid = true;
+  EXPECT_NEAR(pitch_after(0.2), p.avoid_brake_rad, 1e-4f);  // a new one
+}
+
+TEST_F(Avoiding, AnAvoidThatFlickersBrakesOnce) {
+  for (const float hold_s : {3.f, 0.f}) {
+    p.avoid_hold_s = hold_s;
+    in_flight(p, in, state);
+    int ticks = 0;
+    for (int i = 0; i < 200; ++i) {
+      avoid = i % 3 == 0;
+      if (pitch_after(0.05) > 0.01f) ++ticks;
+    }
+    EXPECT_GT(ticks, 3) << hold_s;
+    EXPECT_LE(ticks, 22) << hold_s;  // a second, and the way back to level
+  }
+}
+
+TEST_F(Avoiding, WithTheSidewaysHoldAloneItBrakesThoughTheVelocityIsKnown) {
+  p.velocity_hold.hold = VelocityHold::kSideways;
+  velocity_seen = true;
+  velocity_mps = 1.f;
+  in_flight(p, in, state);
+  EXPECT_NEAR(pitch_after(1.), 0.f, 1e-4f);
+  avoid = true;
+  EXPECT_NEAR(pitch_after(0.5), p.avoid_brake_rad, 1e-4f);
+  EXPECT_NEAR(pitch_after(0.7), 0.f, 1e-4f);
+}
+
+TEST_F(Avoiding, AHeldForwardVelocityBrakesAloneWhateverTheNoseUpIs) {
+  std::array<float, 2> pitch{};
+  for (const std::size_t i : {0u, 1u}) {
+    p.avoid_brake_rad = i == 0 ? 0.f : 0.2f;
+    velocity_seen = true;
+    avoid = false;
+    velocity_mps = 0.2f;
+    in_flight(p, in, state);
+    pitch_after(1.);
+    avoid = true;
+    pitch[i] = pitch_after(0.5);
+  }
+  EXPECT_GT(pitch[0], 0.02f);
+  EXPECT_EQ(pitch[0], pitch[1]);
+}
+
+TEST_F(Avoiding, OneRaisedWhileThePilotFlewBrakesFromTheTakeoverOn) {
+  in_flight(p, in, state);
+  avoid = true;
+  follows = false;
+  EXPECT_NEAR(pitch_after(5.), 0.f, 1e-4f);
+  follows = true;
+  EXPECT_NEAR(pitch_after(0.5), p.avoid_brake_rad, 1e-4f);
+  EXPECT_NEAR(pitch_after(1.), 0.f, 1e-4f);
+}
+
 TEST(ControlStep, NothingIsSentBeforeTheAutopilotWasHeard) {
   ControlState state;
   ControlInput in = good_input(50 * kMillisecond);
