@@ -46,7 +46,7 @@ struct Intention {
   TimeNs velocity_exposed_at_ns = kNever;
   int climb_source = -1;
   float climb_mps = 0, climb_1ps = 0;
-  bool avoid = false;  ///< something is ahead: not forward; says nothing of heading, height or sideways
+  bool avoid = false;    ///< something is ahead: not forward; says nothing of heading, height or sideways
   bool steered = false;  ///< a behaviour with a weight says something of the heading
   float heading_rate_radps = 0;
   float pitch_rad = 0;

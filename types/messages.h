@@ -57,9 +57,9 @@ struct CueBody {
   std::uint8_t has_height = 0, has_heading_rate = 0, has_pitch = 0, avoid = 0;
   std::uint8_t has_velocity = 0, has_climb = 0;
   std::uint8_t reserved[1] = {};
-  float quality = 0;         ///< 0 ... 1
-  float height_m = 0;        ///< above the ground, along the world vertical
-  float height_sigma_m = 0;  ///< one standard deviation
+  float quality = 0;             ///< 0 ... 1
+  float height_m = 0;            ///< above the ground, along the world vertical
+  float height_sigma_m = 0;      ///< one standard deviation
   float heading_rate_radps = 0;  ///< wish: clockwise seen from above
   float pitch_rad = 0;           ///< wish: nose up, so forward is negative
   /// Measured over ground, along the heading and to its right, level [m/s].
@@ -126,7 +126,7 @@ struct Command {
   float height_m = 0;  ///< control's own filtered estimate
   float climb_rate_mps = 0;
   float velocity_forward_mps = 0, velocity_right_mps = 0;  ///< as used; 0 when nobody measures it
-  std::int32_t cue_source = -1;  ///< behaviour index whose height was used, -1 none
+  std::int32_t cue_source = -1;                            ///< behaviour index whose height was used, -1 none
   FlightMode mode = FlightMode::kDisarmed;
   ModeReason reason = ModeReason::kNone;
   std::uint8_t sent = 0;

@@ -169,7 +169,8 @@ class ControlBench {
     Config c = load_config({}, {"maker"});
     c.behaviours[0].enabled = true;
     c.control_thread.overrun = o.overrun;
-    c.control.arbiter.rows[0] = {.age_limit_ns = o.cue_age_limit_ns, .height_rank = 0, .heading_weight = 1.f, .pitch_weight = 1.f};
+    c.control.arbiter.rows[0] = {
+        .age_limit_ns = o.cue_age_limit_ns, .height_rank = 0, .heading_weight = 1.f, .pitch_weight = 1.f};
     c.control.attitude_age_limit_ns = o.attitude_age_limit_ns;
     c.control.link_age_limit_ns = 60 * kSecond;
     c.control.barometer.enabled = o.pressure_every > 0;
