@@ -16,7 +16,6 @@ void note_evidence(Intention& intention, const Cue& cue, const ArbiterRow& row) 
     intention.oldest_exposed_at_ns = cue.exposed_at_ns;
 }
 
-
 /// Keeps the first source in rank order; one over its budget stands behind every punctual one.
 struct Choice {
   int source = -1, rank = 0;
@@ -25,6 +24,11 @@ struct Choice {
     if (its_rank >= 0 && (source < 0 || r < rank)) source = behaviour, rank = r;
   }
 };
+
+/// Neither too old nor from ahead of the clock.
+bool recent(const Cue& cue, const ArbiterRow& row, TimeNs now_ns) noexcept {
+  return cue.exposed_at_ns <= now_ns + kClockSlack && cue.exposed_at_ns >= now_ns - row.age_limit_ns;
+}
 
 bool all_finite(const CueBody& b) noexcept {
   const float sum = b.height_m + b.height_sigma_m + b.heading_rate_radps + b.pitch_rad + b.velocity_forward_mps +
@@ -36,18 +40,17 @@ void add_wishes(const Cue& cue, const ArbiterRow& row, Intention& out) noexcept 
   const CueBody& b = cue.body;
   const bool heading = b.has_heading_rate != 0 && row.heading_weight > 0;
   const bool pitch = b.has_pitch != 0 && row.pitch_weight > 0;
-  if (b.avoid != 0) out.avoid = true;
   if (heading) out.heading_rate_radps += row.heading_weight * b.heading_rate_radps;
   if (pitch) out.pitch_rad += row.pitch_weight * b.pitch_rad;
   out.steered = out.steered || heading;
-  if (b.avoid != 0 || row.heading_weight > 0 || row.pitch_weight > 0) note_evidence(out, cue, row);
+  if (row.heading_weight > 0 || row.pitch_weight > 0) note_evidence(out, cue, row);
 }
 
 }  // namespace
 
 bool usable(const Cue& cue, const ArbiterRow& row, TimeNs now_ns) noexcept {
   return all_finite(cue.body) && cue.body.validity == Validity::kValid && cue.over_budget == 0 &&
-         cue.exposed_at_ns <= now_ns + kClockSlack && now_ns - cue.exposed_at_ns <= row.age_limit_ns;
+         recent(cue, row, now_ns);
 }
 
 Intention arbitrate(const ArbiterParams& params, const CueSet& set, TimeNs now_ns) noexcept {
@@ -57,15 +60,17 @@ Intention arbitrate(const ArbiterParams& params, const CueSet& set, TimeNs now_n
     const auto k = static_cast<std::size_t>(i);
     const ArbiterRow& row = params.rows[k];
     const Cue& cue = set.cues[k];
-    if (!set.present[k] || !usable(cue, row, now_ns)) continue;
+    if (!set.present[k] || !recent(cue, row, now_ns)) continue;
+    if (cue.body.avoid != 0) out.avoid = true, note_evidence(out, cue, row);
+    if (!usable(cue, row, now_ns)) continue;
     if (cue.body.has_height != 0) height.offer(i, row.height_rank, set.overdue[k]);
     if (cue.body.has_velocity != 0) velocity.offer(i, row.velocity_rank, set.overdue[k]);
     if (cue.body.has_climb != 0) climb.offer(i, row.climb_rank, set.overdue[k]);
     add_wishes(cue, row, out);
   }
   for (const int source : {height.source, velocity.source, climb.source})
-    if (source >= 0) note_evidence(out, set.cues[static_cast<std::size_t>(source)],
-                                   params.rows[static_cast<std::size_t>(source)]);
+    if (source >= 0)
+      note_evidence(out, set.cues[static_cast<std::size_t>(source)], params.rows[static_cast<std::size_t>(source)]);
   if ((out.height_source = height.source) >= 0) {
     const Cue& cue = set.cues[static_cast<std::size_t>(height.source)];
     out.height_m = cue.body.height_m, out.height_sigma_m = cue.body.height_sigma_m;

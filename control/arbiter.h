@@ -1,7 +1,8 @@
 // The arbiter turns the newest cue of every behaviour into one intention. A cue older than its age limit is absent.
-// Avoid wins over everything else a behaviour says; heading and pitch are weighted sums; height, velocity and the wish to
-// climb each come from the first source in their fallback order that can see; one that is at this moment over its time
-// budget is asked last. Above all of it stands manual control: see control/flight_mode.h. Why: docs/behaviours.md.
+// Avoid wins over every wish to go forward, and needs no usable cue: one that is blind, late or broken in another field
+// still brakes. Heading and pitch are weighted sums; height, velocity and the wish to climb each come from the first
+// source in their fallback order that can see; one that is at this moment over its time budget is asked last. Above all
+// of it stands manual control: see control/flight_mode.h. Why: docs/behaviours.md.
 #pragma once
 
 #include <array>
@@ -45,7 +46,7 @@ struct Intention {
   TimeNs velocity_exposed_at_ns = kNever;
   int climb_source = -1;
   float climb_mps = 0, climb_1ps = 0;
-  bool avoid = false;
+  bool avoid = false;    ///< something is ahead: not forward; says nothing of heading, height or sideways
   bool steered = false;  ///< a behaviour with a weight says something of the heading
   float heading_rate_radps = 0;
   float pitch_rad = 0;

@@ -51,22 +51,45 @@ LevelVelocity accel_level(const ControlInput& in) noexcept {
   return {level.x(), level.y()};
 }
 
+void estimate_velocity(const ControlParams& p, const ControlInput& in, const Intention& intention,
+                       ControlState& s) noexcept {
+  predict(p.velocity_filter, accel_level(in), in.attitude_present ? in.attitude.rate_body_radps[2] : 0.f, in.now_ns,
+          s.velocity);
+  if (intention.velocity_source < 0) return;
+  correct(p.velocity_filter, {intention.velocity_forward_mps, intention.velocity_right_mps},
+          intention.velocity_exposed_at_ns, in.now_ns, s.velocity);
+  if (s.velocity.last_exposed_at_ns != intention.velocity_exposed_at_ns) return;  // not newer than what it rests on
+  const ArbiterRow& row = p.arbiter.rows[static_cast<std::size_t>(intention.velocity_source)];
+  s.velocity_until_ns = s.velocity.last_exposed_at_ns + std::min(row.age_limit_ns, p.velocity_filter.max_age_ns);
+}
+
+/// The velocity is known while neither the filter nor the arbiter finds the last cue of it too old.
+bool velocity_known(const ControlParams& p, const ControlInput& in, const ControlState& s) noexcept {
+  return known(p.velocity_filter, s.velocity, in.now_ns) && in.now_ns <= s.velocity_until_ns;
+}
+
+bool velocity_held(const ControlParams& p, const ControlInput& in, const ControlState& s) noexcept {
+  return p.velocity_hold.hold != VelocityHold::kOff && velocity_known(p, in, s);
+}
+
+/// The velocity held rests on a cue that may be gone by now: its age counts all the same.
+void rest_on_velocity(const ControlState& s, Intention& intention) noexcept {
+  const TimeNs exposed_at_ns = s.velocity.last_exposed_at_ns;
+  intention.usable_until_ns = std::min(intention.usable_until_ns, s.velocity_until_ns);
+  if (intention.oldest_exposed_at_ns == kNever || exposed_at_ns < intention.oldest_exposed_at_ns)
+    intention.oldest_exposed_at_ns = exposed_at_ns;
+}
+
 /// Carries height and velocity forward and corrects them by what was seen. True if a height is known now.
 bool estimate(const ControlParams& p, const ControlInput& in, const Intention& intention, ControlState& s) noexcept {
   predict(p.height_filter, accel_up(in), in.now_ns, s.height);
-  predict(p.velocity_filter, accel_level(in), in.attitude_present ? in.attitude.rate_body_radps[2] : 0.f, in.now_ns,
-          s.velocity);
-  if (intention.velocity_source >= 0)
-    correct(p.velocity_filter, {intention.velocity_forward_mps, intention.velocity_right_mps},
-            intention.velocity_exposed_at_ns, in.now_ns, s.velocity);
+  estimate_velocity(p, in, intention, s);
   const bool seen = intention.height_source >= 0;
+  if (seen) correct(p.height_filter, intention.height_m, intention.height_exposed_at_ns, in.now_ns, s.height);
   float barometric_m = 0;
-  const bool pressed =
-      barometer_step(p.barometer, in.pressure_hpa, !in.autopilot.armed, seen, intention.height_m, s.barometer, barometric_m);
-  if (seen)
-    correct(p.height_filter, intention.height_m, intention.height_exposed_at_ns, in.now_ns, s.height);
-  else if (pressed)
-    correct(p.height_filter, barometric_m, in.now_ns, in.now_ns, s.height);
+  const bool pressed = barometer_step(p.barometer, in.pressure_hpa, !in.autopilot.armed, seen, s.height.height_m,
+                                      s.barometer, barometric_m);
+  if (!seen && pressed) correct(p.height_filter, barometric_m, in.now_ns, in.now_ns, s.height);
   if (seen || pressed) s.ground_seen_at_ns = in.now_ns;
   return seen || pressed;
 }
@@ -75,11 +98,13 @@ bool estimate(const ControlParams& p, const ControlInput& in, const Intention& i
 float target_height(const ControlParams& p, const Intention& intention, const MissionWish& wish, float dt_s,
                     const ControlState& s) noexcept {
   if (!wish.behaviours_climb || !s.altitude_hold.engaged) return wish.target_m;
-  const float climb_mps = intention.climb_source >= 0 ? intention.climb_mps + intention.climb_1ps * s.height.height_m : 0.f;
+  const float climb_mps =
+      intention.climb_source >= 0 ? intention.climb_mps + intention.climb_1ps * s.height.height_m : 0.f;
   return std::clamp(s.altitude_hold.setpoint_m + climb_mps * dt_s, p.min_height_m, p.max_height_m);
 }
 
-/// Yaw rate: the behaviours' sum and the sticks; while there is neither, back to the heading held, if one is to be held.
+/// Yaw rate: the behaviours' sum and the sticks; while there is neither, back to the heading held, if one is to be
+/// held.
 float wanted_yaw_rate(const ControlParams& p, const ControlInput& in, const Intention& intention,
                       const MissionWish& wish, ControlState& s) noexcept {
   const float asked = (wish.steer ? intention.heading_rate_radps : 0.f) + wish.yaw_rate_radps;
@@ -94,29 +119,61 @@ float wanted_yaw_rate(const ControlParams& p, const ControlInput& in, const Inte
   return kHeadingGain_1ps * std::remainder(s.held_yaw_rad - yaw_rad, 2 * std::numbers::pi_v<float>);
 }
 
-/// Forward speed: the leg's, but zero from an avoid on until its hold time is over. Avoid wins over everything.
-float wanted_speed(const ControlParams& p, const ControlInput& in, const Intention& intention, const MissionWish& wish,
-                   ControlState& s) noexcept {
-  if (intention.avoid) s.avoid_until_ns = in.now_ns + from_seconds(static_cast<double>(p.avoid_hold_s));
-  return s.avoid_until_ns != kNever && in.now_ns < s.avoid_until_ns ? 0.f : wish.forward_mps;
+constexpr DurationNs kLongestBrake = 1 * kSecond;  // blind: any longer and a vehicle that stood would back away
+
+/// Notes an avoid. One that comes back before it was away for the hold time, or for a brake's length, is no new one.
+void hear_avoid(const ControlParams& p, const ControlInput& in, const Intention& intention, ControlState& s) noexcept {
+  if (!intention.avoid) return;
+  const DurationNs away_ns = std::max(from_seconds(static_cast<double>(p.avoid_hold_s)), kLongestBrake);
+  if (s.avoid_raised_at_ns == kNever || in.now_ns - s.avoid_heard_at_ns >= away_ns) s.avoid_raised_at_ns = in.now_ns;
+  s.avoid_heard_at_ns = in.now_ns;
+}
+
+/// From an avoid on until its hold time is over.
+bool avoiding(const ControlParams& p, const ControlInput& in, const ControlState& s) noexcept {
+  if (s.avoid_heard_at_ns == kNever) return false;
+  const DurationNs since_ns = in.now_ns - s.avoid_heard_at_ns;
+  return since_ns <= 0 || since_ns < from_seconds(static_cast<double>(p.avoid_hold_s));
+}
+
+/// Pitch: what holds the velocity, the behaviours' wish and the stick. While avoiding nothing pitches forward, and
+/// where no held velocity brakes, a short nose-up does.
+float wanted_pitch(const ControlParams& p, const ControlInput& in, const Intention& intention, const MissionWish& wish,
+                   float hold_rad, const ControlState& s) noexcept {
+  const float wish_rad = wish.steer ? intention.pitch_rad : 0.f;
+  if (!avoiding(p, in, s)) return hold_rad + wish_rad + wish.pitch_rad;
+  const bool forward_held = p.velocity_hold.hold == VelocityHold::kBoth && velocity_known(p, in, s);
+  const bool brake =
+      wish.steer && !forward_held && s.avoid_raised_at_ns != kNever && in.now_ns - s.avoid_raised_at_ns < kLongestBrake;
+  return hold_rad + std::max({0.f, wish_rad, brake ? p.avoid_brake_rad : 0.f});
+}
+
+/// While somebody else had the vehicle nothing may be held from before: holds begin where it is now. An avoid raised
+/// while the pilot flew brakes from the takeover on.
+void forget_holds(FlightMode last_mode, ControlState& s) noexcept {
+  if (last_mode != FlightMode::kManual && last_mode != FlightMode::kFailsafe && last_mode != FlightMode::kDisarmed)
+    return;
+  s.altitude_hold.engaged = s.holding_yaw = false;
+  s.velocity_hold = VelocityHoldState{};
+  if (last_mode == FlightMode::kManual) s.avoid_raised_at_ns = kNever;
 }
 
 /// What behaviours and mission together want, before limits and mode.
 Setpoint wanted_setpoint(const ControlParams& p, const ControlInput& in, const Intention& intention,
                          const MissionWish& wish, ControlState& s) noexcept {
   Setpoint wanted;
-  const float forward_mps = wanted_speed(p, in, intention, wish, s);
+  hear_avoid(p, in, intention, s);
   if (!wish.rotors) {
     s.altitude_hold.engaged = s.holding_yaw = false;
     s.velocity_hold = VelocityHoldState{};
     return wanted;
   }
-  const bool moving = known(p.velocity_filter, s.velocity, in.now_ns);
-  const Tilt tilt = velocity_hold_step(p.velocity_hold, forward_mps, moving, s.velocity.velocity_mps, in.dt_s, s.velocity_hold);
-  const float pitch_wish = wish.steer ? intention.pitch_rad : 0.f;
-  const bool avoiding = intention.avoid || (s.avoid_until_ns != kNever && in.now_ns < s.avoid_until_ns);
+  const float forward_mps = avoiding(p, in, s) ? 0.f : wish.forward_mps;
+  const bool moving = velocity_known(p, in, s);
+  const Tilt tilt =
+      velocity_hold_step(p.velocity_hold, forward_mps, moving, s.velocity.velocity_mps, in.dt_s, s.velocity_hold);
   wanted.roll_rad = tilt.roll_rad + wish.roll_rad;
-  wanted.pitch_rad = tilt.pitch_rad + (avoiding ? std::fmax(0.f, pitch_wish) : pitch_wish + wish.pitch_rad);
+  wanted.pitch_rad = wanted_pitch(p, in, intention, wish, tilt.pitch_rad, s);
   wanted.yaw_rate_radps = wanted_yaw_rate(p, in, intention, wish, s);
   wanted.thrust = altitude_hold_step(p.altitude_hold, target_height(p, intention, wish, in.dt_s, s), s.height.height_m,
                                      s.height.climb_rate_mps, cos_tilt(in), in.dt_s, s.altitude_hold);
@@ -189,12 +246,14 @@ void refuse(const ControlParams& p, const ControlInput& in, Refusal refusal, Con
 }
 
 ControlOutput control_step(const ControlParams& p, const ControlInput& in, ControlState& s) noexcept {
-  const Intention intention = arbitrate(p.arbiter, in.cues, in.now_ns);
+  Intention intention = arbitrate(p.arbiter, in.cues, in.now_ns);
+  forget_holds(s.mode.mode, s);
   const bool height_seen = estimate(p, in, intention, s);
+  if (velocity_held(p, in, s)) rest_on_velocity(s, intention);
   const MissionWish wish =
       mission_step(p.mission,
-                   {in.now_ns, in.autopilot.armed, in.autopilot.follows, height_seen,
-                    s.height.height_m, s.height.climb_rate_mps, in.stop_requested, in.autopilot.heard_at_ns != kNever},
+                   {in.now_ns, in.autopilot.armed, in.autopilot.follows, height_seen, s.height.height_m,
+                    s.height.climb_rate_mps, in.stop_requested, in.autopilot.heard_at_ns != kNever},
                    s.mission);
   const Setpoint wanted = wanted_setpoint(p, in, intention, wish, s);
   s.sent_before = s.sent;
@@ -213,10 +272,10 @@ ControlOutput control_step(const ControlParams& p, const ControlInput& in, Contr
   c.height_setpoint_m = wish.rotors ? s.altitude_hold.setpoint_m : 0.f;
   c.height_m = s.height.height_m;
   c.climb_rate_mps = s.height.climb_rate_mps;
-  if (known(p.velocity_filter, s.velocity, in.now_ns)) {
+  if (velocity_known(p, in, s)) {
     c.velocity_forward_mps = s.velocity.velocity_mps.forward;
     c.velocity_right_mps = s.velocity.velocity_mps.right;
-    c.velocity_held = p.velocity_hold.hold != VelocityHold::kOff ? 1 : 0;
+    c.velocity_held = velocity_held(p, in, s) ? 1 : 0;
   }
   c.avoid = intention.avoid ? 1 : 0;
   c.mission_phase = static_cast<std::uint8_t>(s.mission.phase);

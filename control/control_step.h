@@ -29,10 +29,12 @@ struct ControlParams {
   DurationNs attitude_age_limit_ns = 200 * kMillisecond;
   DurationNs link_age_limit_ns = 300 * kMillisecond;  ///< silence after which the link counts as lost
   DurationNs ground_hold_limit_ns = 1 * kSecond;      ///< how long to hold on the accelerometer alone
-  float avoid_hold_s = 3.f;    ///< forward speed stays zero this long after avoid was raised
-  bool hold_heading = false;   ///< while nobody steers, keep the heading of the moment nobody began to
+  float avoid_hold_s = 3.f;                           ///< forward speed stays zero this long after avoid was raised
+  float avoid_brake_rad =
+      0.0873f;                ///< nose-up for the first second of an avoid where no held velocity brakes; 0: level
+  bool hold_heading = false;  ///< while nobody steers, keep the heading of the moment nobody began to
   float min_height_m = 0.3f, max_height_m = 4.f;  ///< where behaviours may climb and sink to
-  float failsafe_thrust_share = 0.96f;                ///< of hover thrust: a gentle descent
+  float failsafe_thrust_share = 0.96f;            ///< of hover thrust: a gentle descent
   FailsafeAction failsafe_action = FailsafeAction::kDescend;
 };
 
@@ -51,7 +53,7 @@ struct ControlInput {
   AttitudeSample attitude;
   bool accel_present = false;
   std::array<float, 3> accel_body_mps2{};  ///< mean specific force since the last tick
-  float pressure_hpa = 0;                  ///< mean since the last tick; 0: none came
+  float pressure_hpa = 0;                  ///< mean of those since the last tick; 0: none came
   AutopilotState autopilot;
   bool stop_requested = false;
   bool deadlines_missed = false;  ///< the last two ticks
@@ -62,8 +64,9 @@ struct ControlState {
   AltitudeHoldState altitude_hold;
   BarometerState barometer;
   VelocityFilterState velocity;
+  TimeNs velocity_until_ns = kNever;  ///< the cue that `velocity` rests on reaches its age limit
   VelocityHoldState velocity_hold;
-  TimeNs avoid_until_ns = kNever;
+  TimeNs avoid_raised_at_ns = kNever, avoid_heard_at_ns = kNever;  ///< its first tick and its latest
   float held_yaw_rad = 0;
   bool holding_yaw = false;
   Setpoint sent, sent_before;  ///< of this tick and of the one before

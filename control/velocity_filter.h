@@ -11,9 +11,9 @@
 namespace wasp::control {
 
 struct VelocityFilterParams {
-  float velocity_gain = 0.35f;       ///< per correction, 0 ... 1
-  float bias_gain_1ps = 0.15f;       ///< per correction [1/s]
-  float max_innovation_mps = 1.0f;   ///< a cue further away is a jump: believed only after `jumps_to_accept` in a row
+  float velocity_gain = 0.35f;      ///< per correction, 0 ... 1
+  float bias_gain_1ps = 0.15f;      ///< per correction [1/s]
+  float max_innovation_mps = 1.0f;  ///< a cue further away is a jump: believed only after `jumps_to_accept` in a row
   int jumps_to_accept = 5;
   DurationNs max_age_ns = 300 * kMillisecond;  ///< without a cue for longer the velocity counts as unknown
 };

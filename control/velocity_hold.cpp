@@ -25,9 +25,9 @@ Tilt velocity_hold_step(const VelocityHoldParams& p, float forward_mps, bool is_
     return {};
   }
   const bool braking = std::fabs(forward_mps) < std::fabs(s.setpoint_mps);
-  s.setpoint_mps = braking ? forward_mps
-                           : s.setpoint_mps + std::clamp(forward_mps - s.setpoint_mps, -p.ramp_mps2 * dt_s,
-                                                         p.ramp_mps2 * dt_s);
+  s.setpoint_mps =
+      braking ? forward_mps
+              : s.setpoint_mps + std::clamp(forward_mps - s.setpoint_mps, -p.ramp_mps2 * dt_s, p.ramp_mps2 * dt_s);
   const float ahead = axis(p, s.setpoint_mps - measured.forward, dt_s, s.integral_mps2.forward);
   const float right = axis(p, -measured.right, dt_s, s.integral_mps2.right);
   return {std::atan2(right, kGravity_mps2), p.hold == VelocityHold::kBoth ? -std::atan2(ahead, kGravity_mps2) : 0.f};

@@ -1,5 +1,5 @@
-// Tilt from velocity: PI on the level velocity over ground, the wanted acceleration becomes pitch and roll. Sideways the
-// vehicle is held at rest, so that steering by heading alone does not skid from wall to wall.
+// Tilt from velocity: PI on the level velocity over ground, the wanted acceleration becomes pitch and roll. Sideways
+// the vehicle is held at rest, so that steering by heading alone does not skid from wall to wall.
 #pragma once
 
 #include <cstdint>

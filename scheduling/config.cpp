@@ -158,6 +158,9 @@ void read_velocity(TomlTable& t, control::ControlParams& p) {
   t.number("velocity_max_accel_mps2", hold.max_accel_mps2, 0.1, 5);
   t.number("velocity_ramp_mps2", hold.ramp_mps2, 0.05, 10);
   t.number("avoid_hold_s", p.avoid_hold_s, 0, 36'000);
+  double brake_deg = to_degrees(Radians{static_cast<double>(p.avoid_brake_rad)}).value;
+  t.number("avoid_brake_deg", brake_deg, 0, 15);
+  p.avoid_brake_rad = static_cast<float>(to_radians(Degrees{brake_deg}).value);
   t.flag("hold_heading", p.hold_heading);
   t.flag("barometer", p.barometer.enabled);
   t.number("standing_height_m", p.barometer.standing_height_m, 0, 5);

@@ -99,25 +99,25 @@ void ControlLoop::gather(control::ControlInput& input) WASP_REALTIME {
     input.cues.overdue[i] = source.watch != nullptr && source.watch->overdue(input.now_ns);
   }
   input.attitude_present = attitude_.copy_newest(input.attitude);
-  mean_acceleration(input);
+  mean_inertial(input);
   LinkReport report;
   if (wiring_.link->load(report))
     input.autopilot = {report.heard_at_ns, report.armed != 0,
                        static_cast<int>(report.custom_mode) == config_.follow_mode};
 }
 
-/// Mean specific force of the samples that came since the last tick; bounded by the ring's length.
-void ControlLoop::mean_acceleration(control::ControlInput& input) WASP_REALTIME {
+/// Mean specific force and pressure of the samples that came since the last tick; bounded by the ring's length.
+void ControlLoop::mean_inertial(control::ControlInput& input) WASP_REALTIME {
   ImuSample sample;
   int n = 0;
   std::array<float, 3> sum{};
-  float pressure = 0;
+  control::PressureMean pressure;
   for (std::uint32_t i = 0; i < shm::kImuSlots && imu_.read(sample); ++i) {
     for (std::size_t k = 0; k < 3; ++k) sum[k] += sample.accel_body_mps2[k];
-    pressure += sample.pressure_hpa;
+    pressure.add(sample);
     ++n;
   }
-  input.pressure_hpa = n > 0 ? pressure / static_cast<float>(n) : 0.f;
+  input.pressure_hpa = pressure.take();
   input.accel_present = n > 0;
   for (std::size_t k = 0; n > 0 && k < 3; ++k) input.accel_body_mps2[k] = sum[k] / static_cast<float>(n);
 }

@@ -62,7 +62,7 @@ class ControlLoop {
   };
   void tick(const rt::Release& release, LoopControl& control) WASP_REALTIME;
   void gather(control::ControlInput& input) WASP_REALTIME;
-  void mean_acceleration(control::ControlInput& input) WASP_REALTIME;
+  void mean_inertial(control::ControlInput& input) WASP_REALTIME;
   void release(const rt::Release& release, LoopControl& control) WASP_REALTIME;
   std::size_t encode(const Command& command, TimeNs now_ns) WASP_REALTIME;
   std::size_t refuse_if_too_old(const control::ControlInput& input, control::ControlOutput& output, std::size_t used,

@@ -75,7 +75,7 @@ void Lockstep::exchange(TimeNs now_ns) {
 
 void Lockstep::on_imu(const ImuSample& sample) noexcept {
   for (std::size_t k = 0; k < 3; ++k) accel_sum_[k] += static_cast<double>(sample.accel_body_mps2[k]);
-  pressure_sum_ += static_cast<double>(sample.pressure_hpa);
+  pressure_.add(sample);
   ++accel_count_;
   imu_.push_back(sample);
   log_.imu.push_back(sample);
@@ -176,9 +176,8 @@ void Lockstep::tick(TimeNs now_ns) {
   input_.accel_present = accel_count_ > 0;
   for (std::size_t k = 0; k < 3 && accel_count_ > 0; ++k)
     input_.accel_body_mps2[k] = static_cast<float>(accel_sum_[k] / accel_count_);
-  input_.pressure_hpa = accel_count_ > 0 ? static_cast<float>(pressure_sum_ / accel_count_) : 0.f;
+  input_.pressure_hpa = pressure_.take();
   accel_sum_ = {};
-  pressure_sum_ = 0;
   accel_count_ = 0;
   control::ControlOutput output = control::control_step(options_.control, input_, state_);
   output.command.due_at_ns = output.command.released_at_ns = output.command.computed_at_ns = now_ns;

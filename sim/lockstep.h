@@ -61,9 +61,9 @@ struct LockstepSample {
 
 struct LockstepLog {
   std::vector<LockstepSample> samples;
-  std::vector<Cue> cues;        ///< in the order in which they reached control
-  std::vector<ImuSample> imu;   ///< as the companion heard it, 200 Hz
-  std::uint64_t frames = 0;     ///< exposures of the front camera
+  std::vector<Cue> cues;       ///< in the order in which they reached control
+  std::vector<ImuSample> imu;  ///< as the companion heard it, 200 Hz
+  std::uint64_t frames = 0;    ///< exposures of the front camera
 };
 
 class Lockstep {
@@ -103,12 +103,12 @@ class Lockstep {
   std::vector<std::uint8_t> gray_, gray_down_, bytes_;
   std::vector<std::uint16_t> depth_mm_;
   std::deque<AttitudeSample> attitudes_;
-  std::deque<ImuSample> imu_;  ///< of the last second, for the frames
+  std::deque<ImuSample> imu_;          ///< of the last second, for the frames
   std::vector<TimeNs> stepped_at_ns_;  ///< exposure of each behaviour's last step
   std::deque<Cue> pending_;
   LockstepLog log_;
   std::array<double, 3> accel_sum_{};
-  double pressure_sum_ = 0;
+  control::PressureMean pressure_;
   int accel_count_ = 0;
   std::uint32_t frame_ = 0, down_frame_ = 0;
   TimeNs request_due_ns_ = 0, timesync_due_ns_ = 0;

@@ -36,6 +36,7 @@ struct ImuSample {
   std::uint32_t reserved = 0;
 };
 static_assert(sizeof(ImuSample) == 64);
+inline constexpr std::uint32_t kImuHasPressure = 0x200;  ///< bit of ImuSample::fields: abs_pressure
 
 /// Attitude as the autopilot estimates it, 64 bytes.
 struct AttitudeSample {
@@ -56,9 +57,9 @@ struct CueBody {
   std::uint8_t has_height = 0, has_heading_rate = 0, has_pitch = 0, avoid = 0;
   std::uint8_t has_velocity = 0, has_climb = 0;
   std::uint8_t reserved[1] = {};
-  float quality = 0;         ///< 0 ... 1
-  float height_m = 0;        ///< above the ground, along the world vertical
-  float height_sigma_m = 0;  ///< one standard deviation
+  float quality = 0;             ///< 0 ... 1
+  float height_m = 0;            ///< above the ground, along the world vertical
+  float height_sigma_m = 0;      ///< one standard deviation
   float heading_rate_radps = 0;  ///< wish: clockwise seen from above
   float pitch_rad = 0;           ///< wish: nose up, so forward is negative
   /// Measured over ground, along the heading and to its right, level [m/s].
@@ -125,7 +126,7 @@ struct Command {
   float height_m = 0;  ///< control's own filtered estimate
   float climb_rate_mps = 0;
   float velocity_forward_mps = 0, velocity_right_mps = 0;  ///< as used; 0 when nobody measures it
-  std::int32_t cue_source = -1;  ///< behaviour index whose height was used, -1 none
+  std::int32_t cue_source = -1;                            ///< behaviour index whose height was used, -1 none
   FlightMode mode = FlightMode::kDisarmed;
   ModeReason reason = ModeReason::kNone;
   std::uint8_t sent = 0;
@@ -143,7 +144,7 @@ struct Truth {
   std::array<float, 3> velocity_ned_mps{};
   std::array<float, 4> q_ned_body{1, 0, 0, 0};
   std::array<float, 3> rate_body_radps{};
-  float height_m = 0;  ///< of the vehicle's reference point (camera) above what is below it
+  float height_m = 0;  ///< of the camera above the plane z = 0 of the world, whatever is below it
   float armed = 0;
   float flight_time_s = 0;  ///< since the vehicle first left the ground, 0 before; what moves in the world moves by it
 };

@@ -82,6 +82,53 @@ TEST_F(ArbiterTest, AvoidForbidsForwardPitch) {
   EXPECT_FLOAT_EQ(arbitrate(params, set, 1).pitch_rad, 0.f);
 }
 
+TEST_F(ArbiterTest, AnAvoidIsHeardFromACueThatIsOtherwiseUnusable) {
+  Cue avoid;
+  avoid.exposed_at_ns = 10;
+  avoid.body.avoid = 1;
+  for (const int fault : {0, 1, 2}) {
+    Cue cue = avoid;
+    cue.body.validity = fault == 0 ? Validity::kBlind : Validity::kValid;
+    cue.over_budget = fault == 1 ? 1 : 0;
+    cue.body.climb_mps = fault == 2 ? std::numeric_limits<float>::quiet_NaN() : 0.f;
+    give(2, cue);
+    ASSERT_FALSE(usable(cue, params.rows[2], 20)) << fault;
+    const Intention out = arbitrate(params, set, 20);
+    EXPECT_TRUE(out.avoid) << fault;
+    EXPECT_EQ(out.oldest_exposed_at_ns, 10) << fault;
+    EXPECT_EQ(out.usable_until_ns, 10 + params.rows[2].age_limit_ns) << fault;
+  }
+}
+
+TEST_F(ArbiterTest, NothingElseOfACueThatAvoidsIsTakenUnlessItIsUsable) {
+  params.rows[0].heading_weight = 1.f;
+  Cue cue = height_cue(10, 1.f);
+  cue.body.avoid = cue.body.has_heading_rate = 1;
+  cue.body.heading_rate_radps = 0.5f;
+  cue.over_budget = 1;
+  give(0, cue);
+  const Intention out = arbitrate(params, set, 20);
+  EXPECT_TRUE(out.avoid);
+  EXPECT_EQ(out.height_source, -1);
+  EXPECT_FALSE(out.steered);
+  EXPECT_EQ(out.heading_rate_radps, 0.f);
+}
+
+TEST_F(ArbiterTest, AnAvoidThatIsTooOldFromTheFutureOrNeverExposedIsNone) {
+  Cue avoid;
+  avoid.body.avoid = 1;
+  for (const TimeNs exposed_at_ns : {kSecond - params.rows[2].age_limit_ns - 1, 10 * kSecond, kNever}) {
+    avoid.exposed_at_ns = exposed_at_ns;
+    give(2, avoid);
+    EXPECT_FALSE(arbitrate(params, set, kSecond).avoid) << exposed_at_ns;
+  }
+  avoid.exposed_at_ns = kSecond - params.rows[2].age_limit_ns;
+  give(2, avoid);
+  EXPECT_TRUE(arbitrate(params, set, kSecond).avoid);
+  set.present[2] = false;
+  EXPECT_FALSE(arbitrate(params, set, kSecond).avoid);
+}
+
 TEST_F(ArbiterTest, ASourceThatIsOverItsBudgetAtThisMomentIsAskedLastButNotForgotten) {
   give(0, height_cue(0, 1.f));
   set.overdue[0] = true;

@@ -120,6 +120,223 @@ TEST(ControlStep, HoldAndFailsafeRestOnNoCue) {
   EXPECT_NE(out.attitude_until_ns, kForever);
 }
 
+/// Holds the velocity of behaviour 1, whose cues live 100 ms; the last one says 1 m/s forward and is `age_ns` old.
+ControlOutput with_velocity_aged(DurationNs age_ns, ControlInput& in, ControlState& state) {
+  ControlParams p = params();
+  p.arbiter.rows[1].velocity_rank = 0;
+  p.arbiter.rows[1].age_limit_ns = 100 * kMillisecond;
+  p.velocity_hold.hold = VelocityHold::kBoth;
+  in_flight(p, in, state);
+  in.cues.present[1] = true;
+  Cue& cue = in.cues.cues[1];
+  cue.body.validity = Validity::kValid;
+  cue.body.has_velocity = 1;
+  cue.body.velocity_forward_mps = 1.f;
+  const auto tick = [&] {
+    in.now_ns += 10 * kMillisecond;
+    in.cues.cues[0].exposed_at_ns = in.attitude.exposed_at_ns = in.autopilot.heard_at_ns = in.now_ns;
+    return control_step(p, in, state);
+  };
+  for (int i = 0; i < 30; ++i) {
+    cue.exposed_at_ns = in.now_ns;
+    tick();
+  }
+  ControlOutput out;
+  while (in.now_ns - cue.exposed_at_ns < age_ns) out = tick();
+  return out;
+}
+
+TEST(ControlStep, AVelocityIsHeldNoLongerThanItsSourceMayBeUsed) {
+  ControlInput in;
+  ControlState state;
+  const ControlOutput fresh = with_velocity_aged(90 * kMillisecond, in, state);
+  EXPECT_EQ(fresh.command.velocity_held, 1);
+  EXPECT_GT(fresh.command.q_ned_body[2], 0.03f);  // brakes
+  ControlInput later;
+  ControlState old;
+  const ControlOutput out = with_velocity_aged(150 * kMillisecond, later, old);
+  EXPECT_EQ(out.command.mode, FlightMode::kBehaviour);
+  EXPECT_EQ(out.command.velocity_held, 0);
+  EXPECT_EQ(out.command.velocity_forward_mps, 0.f);
+  EXPECT_LT(out.command.q_ned_body[2], fresh.command.q_ned_body[2]);
+  EXPECT_NEAR(out.command.q_ned_body[2], 0.f, 1e-3f);  // level
+  EXPECT_NEAR(out.command.q_ned_body[1], 0.f, 1e-3f);
+}
+
+TEST(ControlStep, AHeldVelocitysAgeIsAskedAgainRightBeforeTheWriteThoughItsSourceIsBlindByNow) {
+  ControlInput in;
+  ControlState state;
+  with_velocity_aged(50 * kMillisecond, in, state);
+  ControlParams p = params();
+  p.arbiter.rows[1].velocity_rank = 0;
+  p.arbiter.rows[1].heading_weight = p.arbiter.rows[1].pitch_weight = 0;
+  p.velocity_hold.hold = VelocityHold::kBoth;
+  in.cues.cues[1].body.validity = Validity::kBlind;
+  in.now_ns += 10 * kMillisecond;
+  in.cues.cues[0].exposed_at_ns = in.attitude.exposed_at_ns = in.now_ns;
+  const ControlOutput out = control_step(p, in, state);
+  ASSERT_EQ(out.command.velocity_held, 1);
+  EXPECT_EQ(out.cue_until_ns, in.cues.cues[1].exposed_at_ns + 100 * kMillisecond);
+  EXPECT_EQ(out.command.exposed_at_ns, in.cues.cues[1].exposed_at_ns);
+  EXPECT_EQ(refusal_at(out, out.cue_until_ns), Refusal::kNone);
+  EXPECT_EQ(refusal_at(out, out.cue_until_ns + 1), Refusal::kCueTooOld);
+  p.velocity_hold.hold = VelocityHold::kOff;  // not rested on: the height's age alone counts
+  ControlState other = state;
+  EXPECT_EQ(control_step(p, in, other).cue_until_ns, in.cues.cues[0].exposed_at_ns + p.arbiter.rows[0].age_limit_ns);
+}
+
+TEST(ControlStep, NothingIsHeldFromTheTimeInWhichThePilotFlew) {
+  ControlParams p = params();
+  p.arbiter.rows[1] = {.velocity_rank = 0, .climb_rank = 0};
+  p.velocity_hold.hold = VelocityHold::kBoth;
+  p.hold_heading = true;
+  p.mission.legs[0].behaviours_climb = true;
+  p.mission.legs[0].forward_mps = 2.f;
+  ControlInput in;
+  ControlState state;
+  in_flight(p, in, state);
+  const auto tick = [&](TimeNs now_ns, bool follows, float yaw_rad) {
+    in = good_input(now_ns);
+    in.autopilot.follows = follows;
+    in.attitude.q_ned_body = {std::cos(yaw_rad / 2), 0, 0, std::sin(yaw_rad / 2)};
+    in.cues.present[1] = true;
+    Cue& cue = in.cues.cues[1];
+    cue.exposed_at_ns = in.now_ns - 40 * kMillisecond;
+    cue.body.validity = Validity::kValid;
+    cue.body.has_climb = cue.body.has_velocity = 1;
+    cue.body.climb_mps = 1.f;
+    return control_step(p, in, state);
+  };
+  TimeNs t = in.now_ns;
+  for (int i = 0; i < 20; ++i) tick(t += 50 * kMillisecond, true, 0.f);
+  ASSERT_GT(state.altitude_hold.setpoint_m, 0.7f);  // in wasp's hands the wish moves the setpoint
+  ASSERT_GT(state.velocity_hold.integral_mps2.forward, 0.1f);
+  for (int i = 0; i < 200; ++i) {
+    const ControlOutput out = tick(t += 50 * kMillisecond, false, 1.f);
+    ASSERT_EQ(out.command.mode, FlightMode::kManual);
+  }
+  const ControlOutput out = tick(t += 50 * kMillisecond, true, 1.f);
+  EXPECT_EQ(out.command.mode, FlightMode::kBehaviour);
+  EXPECT_LT(std::fabs(out.command.height_setpoint_m - out.command.height_m), 0.1f);
+  EXPECT_LT(std::fabs(state.altitude_hold.pid.integral), 0.01f);
+  EXPECT_LT(state.velocity_hold.integral_mps2.forward, 0.01f);
+  EXPECT_LT(state.velocity_hold.setpoint_mps, 0.05f);
+  EXPECT_NEAR(out.command.yaw_rate_radps, 0.f, 1e-3f);  // not back to the heading of before
+}
+
+TEST(ControlStep, AFailsafeLeavesNoHoldBehind) {
+  const ControlParams p = params();
+  ControlInput in;
+  ControlState state;
+  in_flight(p, in, state);
+  state.altitude_hold.setpoint_m = 3.f;
+  for (const bool attitude : {false, true}) {
+    in.now_ns += 50 * kMillisecond;
+    in.cues.cues[0].exposed_at_ns = in.attitude.exposed_at_ns = in.autopilot.heard_at_ns = in.now_ns;
+    in.attitude_present = attitude;
+    control_step(p, in, state);
+    EXPECT_EQ(state.mode.mode, attitude ? FlightMode::kBehaviour : FlightMode::kFailsafe);
+  }
+  EXPECT_LT(std::fabs(state.altitude_hold.setpoint_m - state.height.height_m), 0.1f);
+}
+
+/// A flight of behaviour 0 at height; behaviour 1 says what the test makes it say.
+struct Avoiding : ::testing::Test {
+  ControlParams p = params();
+  ControlInput in;
+  ControlState state;
+  float velocity_mps = 0;
+  bool velocity_seen = false, avoid = false, follows = true;
+  Avoiding() {
+    p.arbiter.rows[1] = {.velocity_rank = 0, .pitch_weight = 1};
+    p.velocity_hold.hold = VelocityHold::kBoth;
+    p.mission.legs[0].forward_mps = 1.f;
+  }
+  /// Pitch of the setpoint after `seconds` more [rad].
+  float pitch_after(double seconds) {
+    float pitch_rad = 0;
+    for (int i = 0; i < std::lround(seconds / 0.05); ++i) {
+      in = good_input(in.now_ns + 50 * kMillisecond);
+      in.autopilot.follows = follows;
+      in.cues.present[1] = true;
+      Cue& cue = in.cues.cues[1];
+      cue.exposed_at_ns = in.now_ns - 40 * kMillisecond;
+      cue.body.validity = velocity_seen ? Validity::kValid : Validity::kBlind;
+      cue.body.has_velocity = velocity_seen ? 1 : 0;
+      cue.body.velocity_forward_mps = velocity_mps;
+      cue.body.avoid = avoid ? 1 : 0;
+      control_step(p, in, state);
+      pitch_rad = state.sent.pitch_rad;
+    }
+    return pitch_rad;
+  }
+};
+
+TEST_F(Avoiding, WithoutAVelocityPitchesUpForASecondAndIsLevelThen) {
+  in_flight(p, in, state);
+  EXPECT_NEAR(pitch_after(0.5), 0.f, 1e-4f);
+  avoid = true;
+  EXPECT_NEAR(pitch_after(0.2), p.avoid_brake_rad, 1e-4f);
+  EXPECT_NEAR(pitch_after(0.8), p.avoid_brake_rad, 1e-4f);
+  EXPECT_NEAR(pitch_after(0.2), 0.f, 1e-4f);
+  EXPECT_NEAR(pitch_after(20.), 0.f, 1e-4f);  // still raised: never again backwards
+  avoid = false;
+  pitch_after(static_cast<double>(p.avoid_hold_s) + 0.1);
+  avoid = true;
+  EXPECT_NEAR(pitch_after(0.2), p.avoid_brake_rad, 1e-4f);  // a new one
+}
+
+TEST_F(Avoiding, AnAvoidThatFlickersBrakesOnce) {
+  for (const float hold_s : {3.f, 0.f}) {
+    p.avoid_hold_s = hold_s;
+    in_flight(p, in, state);
+    int ticks = 0;
+    for (int i = 0; i < 200; ++i) {
+      avoid = i % 3 == 0;
+      if (pitch_after(0.05) > 0.01f) ++ticks;
+    }
+    EXPECT_GT(ticks, 3) << hold_s;
+    EXPECT_LE(ticks, 22) << hold_s;  // a second, and the way back to level
+  }
+}
+
+TEST_F(Avoiding, WithTheSidewaysHoldAloneItBrakesThoughTheVelocityIsKnown) {
+  p.velocity_hold.hold = VelocityHold::kSideways;
+  velocity_seen = true;
+  velocity_mps = 1.f;
+  in_flight(p, in, state);
+  EXPECT_NEAR(pitch_after(1.), 0.f, 1e-4f);
+  avoid = true;
+  EXPECT_NEAR(pitch_after(0.5), p.avoid_brake_rad, 1e-4f);
+  EXPECT_NEAR(pitch_after(0.7), 0.f, 1e-4f);
+}
+
+TEST_F(Avoiding, AHeldForwardVelocityBrakesAloneWhateverTheNoseUpIs) {
+  std::array<float, 2> pitch{};
+  for (const std::size_t i : {0u, 1u}) {
+    p.avoid_brake_rad = i == 0 ? 0.f : 0.2f;
+    velocity_seen = true;
+    avoid = false;
+    velocity_mps = 0.2f;
+    in_flight(p, in, state);
+    pitch_after(1.);
+    avoid = true;
+    pitch[i] = pitch_after(0.5);
+  }
+  EXPECT_GT(pitch[0], 0.02f);
+  EXPECT_EQ(pitch[0], pitch[1]);
+}
+
+TEST_F(Avoiding, OneRaisedWhileThePilotFlewBrakesFromTheTakeoverOn) {
+  in_flight(p, in, state);
+  avoid = true;
+  follows = false;
+  EXPECT_NEAR(pitch_after(5.), 0.f, 1e-4f);
+  follows = true;
+  EXPECT_NEAR(pitch_after(0.5), p.avoid_brake_rad, 1e-4f);
+  EXPECT_NEAR(pitch_after(1.), 0.f, 1e-4f);
+}
+
 TEST(ControlStep, NothingIsSentBeforeTheAutopilotWasHeard) {
   ControlState state;
   ControlInput in = good_input(50 * kMillisecond);

@@ -1,4 +1,5 @@
-// The velocity filter and hold against a simple vehicle: level acceleration by tilt, linear drag, a camera that sees late.
+// The velocity filter and hold against a simple vehicle: level acceleration by tilt, linear drag, a camera that sees
+// late.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -35,8 +36,8 @@ struct Flight {
       correct(filter, seen.front().second, seen.front().first, now_ns, estimate);
       seen.pop_front();
     }
-    const Tilt t = velocity_hold_step(hold, forward_mps, known(filter, estimate, now_ns), estimate.velocity_mps, kDt_s,
-                                      state);
+    const Tilt t =
+        velocity_hold_step(hold, forward_mps, known(filter, estimate, now_ns), estimate.velocity_mps, kDt_s, state);
     constexpr float kLag = kDt_s / 0.2f;  // the attitude follows in 0.2 s
     tilt_accel.forward += kLag * (-9.81f * std::tan(t.pitch_rad) - tilt_accel.forward);
     tilt_accel.right += kLag * (9.81f * std::tan(t.roll_rad) - tilt_accel.right);

@@ -99,6 +99,14 @@ TEST_F(ConfigTest, PoliciesAreReadWhereTheyMakeSense) {
   EXPECT_NE(error_of("[threads.control]\noverrun = \"hurry\"\n").find("catch_up"), std::string::npos);
 }
 
+TEST_F(ConfigTest, TheBrakeOfAnAvoidIsInDegreesInTheFile) {
+  EXPECT_NEAR(load_config({}, kNames).control.avoid_brake_rad, 0.08727f, 1e-4f);
+  EXPECT_NEAR(load_config({write("[control]\navoid_brake_deg = 10.0\n")}, kNames).control.avoid_brake_rad, 0.17453f,
+              1e-4f);
+  EXPECT_EQ(load_config({write("[control]\navoid_brake_deg = 0.0\n")}, kNames).control.avoid_brake_rad, 0.f);
+  EXPECT_NE(error_of("[control]\navoid_brake_deg = -5.0\n").find("avoid_brake_deg"), std::string::npos);
+}
+
 TEST_F(ConfigTest, LaterFilesOverrideSingleKeys) {
   const auto path = write("[control]\ndeadline_us = 7000\n");
   const Config c = load_config({WASP_SOURCE_DIR "/config/wasp.toml", path}, shipped_names());

@@ -57,6 +57,7 @@ struct BenchOptions {
   DurationNs attitude_age_limit_ns = 60 * kSecond;
   rt::ThreadSpec control_thread = {};
   bool found_armed = false;
+  int pressure_every = 0;  ///< so many inertial samples carry one pressure, and no cue a height; 0: the cue's height
 };
 
 class ControlBench {
@@ -168,9 +169,11 @@ class ControlBench {
     Config c = load_config({}, {"maker"});
     c.behaviours[0].enabled = true;
     c.control_thread.overrun = o.overrun;
-    c.control.arbiter.rows[0] = {.age_limit_ns = o.cue_age_limit_ns, .height_rank = 0, .heading_weight = 1.f, .pitch_weight = 1.f};
+    c.control.arbiter.rows[0] = {
+        .age_limit_ns = o.cue_age_limit_ns, .height_rank = 0, .heading_weight = 1.f, .pitch_weight = 1.f};
     c.control.attitude_age_limit_ns = o.attitude_age_limit_ns;
     c.control.link_age_limit_ns = 60 * kSecond;
+    c.control.barometer.enabled = o.pressure_every > 0;
     c.control.mission.leg_count = 1;
     c.control.mission.legs[0] = {0.5f, 3600.f};
     c.control.mission.patience_s = 600.f;
@@ -191,11 +194,14 @@ class ControlBench {
     ImuSample imu;
     imu.exposed_at_ns = now_ns;
     imu.accel_body_mps2 = {0, 0, -9.80665f};
+    if (options_.pressure_every > 0 && inertial_samples_++ % options_.pressure_every == 0)
+      imu.pressure_hpa = 1000.f, imu.fields = kImuHasPressure;
     imu_.write(imu, now_ns);
     Cue cue;
     cue.exposed_at_ns = now_ns;
     cue.body.validity = Validity::kValid;
-    cue.body.has_height = cue.body.has_pitch = 1;
+    cue.body.has_height = options_.pressure_every == 0 ? 1 : 0;
+    cue.body.has_pitch = 1;
     cue.body.height_m = 0.5f;
     cue.body.pitch_rad = 0.1f;  // never level: a level setpoint is not the behaviour's
     cue_.write(cue, now_ns);
@@ -228,6 +234,7 @@ class ControlBench {
   std::atomic<DurationNs> stall_ns_{0};
   std::atomic<std::uint64_t> stalled_tick_{0};
   bool armed_ = false;
+  int inertial_samples_ = 0;
   std::atomic<bool> world_over_{false};
   std::unique_ptr<ControlLoop> loop_;
   std::thread world_;

@@ -128,6 +128,20 @@ TEST(ControlLoop, AnAttitudeThatGrewTooOldBeforeTheWriteMeansFailsafe) {
   });
 }
 
+TEST(ControlLoop, SamplesWithoutAPressureDoNotPullTheBarometricHeight) {
+  ControlBench bench({.pressure_every = 3});
+  bench.start();
+  ASSERT_TRUE(bench.wait_until_flying());
+  ASSERT_TRUE(bench.wait_for_tick(bench.commands.back().tick + 20));
+  bench.end();
+  for (const Command& c : bench.commands) {
+    EXPECT_EQ(c.cue_source, -1);
+    if (c.height_m != 0.f) {  // from the first pressure on
+      EXPECT_NEAR(c.height_m, 0.2f, 0.05f) << c.tick;
+    }
+  }
+}
+
 TEST(ControlLoop, SaysWhyAVehicleFoundArmedIsNotAdopted) {
   ControlBench bench({.found_armed = true});
   bench.start();
