@@ -19,7 +19,7 @@ float axis(const VelocityHoldParams& p, float error, float dt_s, float& integral
 }  // namespace
 
 Tilt velocity_hold_step(const VelocityHoldParams& p, float forward_mps, bool is_known, LevelVelocity measured,
-                        float dt_s, VelocityHoldState& s) noexcept {
+                        float yaw_rate_radps, float dt_s, VelocityHoldState& s) noexcept {
   if (!is_known || p.hold == VelocityHold::kOff) {
     s = VelocityHoldState{};
     return {};
@@ -29,7 +29,8 @@ Tilt velocity_hold_step(const VelocityHoldParams& p, float forward_mps, bool is_
       braking ? forward_mps
               : s.setpoint_mps + std::clamp(forward_mps - s.setpoint_mps, -p.ramp_mps2 * dt_s, p.ramp_mps2 * dt_s);
   const float ahead = axis(p, s.setpoint_mps - measured.forward, dt_s, s.integral_mps2.forward);
-  const float right = axis(p, -measured.right, dt_s, s.integral_mps2.right);
+  const float banked = measured.forward * yaw_rate_radps + axis(p, -measured.right, dt_s, s.integral_mps2.right);
+  const float right = std::clamp(banked, -p.max_accel_mps2, p.max_accel_mps2);
   return {std::atan2(right, kGravity_mps2), p.hold == VelocityHold::kBoth ? -std::atan2(ahead, kGravity_mps2) : 0.f};
 }
 

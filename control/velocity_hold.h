@@ -30,9 +30,10 @@ struct Tilt {
   float roll_rad = 0, pitch_rad = 0;
 };
 
-/// One period towards `forward_mps`. `measured` where `is_known`; otherwise level, and integral and ramp start anew.
-/// Realtime-safe: yes.
+/// One period towards `forward_mps`. `measured` where `is_known`; otherwise level, and integral and ramp start anew. A
+/// turn at `yaw_rate_radps` (as commanded: it takes as long to come as the roll) is banked for, v times the rate, or the
+/// way over ground would follow the heading late and steering by heading would swing. Realtime-safe: yes.
 Tilt velocity_hold_step(const VelocityHoldParams& params, float forward_mps, bool is_known, LevelVelocity measured,
-                        float dt_s, VelocityHoldState& state) WASP_REALTIME;
+                        float yaw_rate_radps, float dt_s, VelocityHoldState& state) WASP_REALTIME;
 
 }  // namespace wasp::control

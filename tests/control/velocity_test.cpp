@@ -20,7 +20,7 @@ struct Flight {
   VelocityFilterState estimate;
   VelocityHoldState state;
   LevelVelocity truth, tilt_accel;
-  float wind_mps2 = 0, accel_error_mps2 = 0;
+  float wind_mps2 = 0, accel_error_mps2 = 0, yaw_rate_radps = 0;
   int delay = 2;
   TimeNs now_ns = 0;
   std::deque<std::pair<TimeNs, LevelVelocity>> seen;
@@ -30,14 +30,16 @@ struct Flight {
     const LevelVelocity accel{tilt_accel.forward - 0.13f * truth.forward + wind_mps2,
                               tilt_accel.right - 0.13f * truth.right};
     truth = {truth.forward + accel.forward * kDt_s, truth.right + accel.right * kDt_s};
-    predict(filter, {accel.forward + accel_error_mps2, accel.right}, 0, now_ns, estimate);
+    const float turn = yaw_rate_radps * kDt_s;  // the frame turns under the velocity
+    truth = {truth.forward + turn * truth.right, truth.right - turn * truth.forward};
+    predict(filter, {accel.forward + accel_error_mps2, accel.right}, yaw_rate_radps, now_ns, estimate);
     if (camera) seen.push_back({now_ns, truth});
     if (static_cast<int>(seen.size()) > delay) {
       correct(filter, seen.front().second, seen.front().first, now_ns, estimate);
       seen.pop_front();
     }
     const Tilt t =
-        velocity_hold_step(hold, forward_mps, known(filter, estimate, now_ns), estimate.velocity_mps, kDt_s, state);
+        velocity_hold_step(hold, forward_mps, known(filter, estimate, now_ns), estimate.velocity_mps, yaw_rate_radps, kDt_s, state);
     constexpr float kLag = kDt_s / 0.2f;  // the attitude follows in 0.2 s
     tilt_accel.forward += kLag * (-9.81f * std::tan(t.pitch_rad) - tilt_accel.forward);
     tilt_accel.right += kLag * (9.81f * std::tan(t.roll_rad) - tilt_accel.right);
@@ -60,6 +62,15 @@ TEST(VelocityHold, StopsASidewaysDrift) {
   EXPECT_NEAR(f.truth.right, 0.f, 0.05f);
 }
 
+TEST(VelocityHold, TheWayOverGroundFollowsATurnOfTheHeading) {
+  Flight f;
+  for (int i = 0; i < 100; ++i) f.tick(0.8f);
+  f.yaw_rate_radps = 0.3f;
+  float skid = 0;
+  for (int i = 0; i < 60; ++i) f.tick(0.8f), skid = std::fmax(skid, std::fabs(f.truth.right));
+  EXPECT_LT(skid, 0.08f);  // 0.14 without banking: ten degrees of drift
+}
+
 TEST(VelocityHold, BrakesWithoutARamp) {
   Flight f;
   for (int i = 0; i < 200; ++i) f.tick(1.2f);
@@ -71,7 +82,7 @@ TEST(VelocityHold, BrakesWithoutARamp) {
 TEST(VelocityHold, IsLevelWhileNobodyKnowsTheVelocity) {
   VelocityHoldState s;
   s.integral_mps2.forward = 0.5f;
-  const Tilt t = velocity_hold_step({.hold = VelocityHold::kBoth}, 1.f, false, {}, kDt_s, s);
+  const Tilt t = velocity_hold_step({.hold = VelocityHold::kBoth}, 1.f, false, {}, 0.f, kDt_s, s);
   EXPECT_EQ(t.roll_rad, 0.f);
   EXPECT_EQ(t.pitch_rad, 0.f);
   EXPECT_EQ(s.integral_mps2.forward, 0.f);
