@@ -1,7 +1,4 @@
 // Compare with the last frame, keep the new one; depth waits a frame, for it belongs to the first of a pair.
-//
-// A direction d1 in the camera at the first frame is R_ned_body1 R_body_cam d1 in the world, hence
-// R_second_first = R_cam_body R_body2_ned R_ned_body1 R_body_cam.
 #include "vision/flow_field.h"
 
 #include <cmath>
@@ -10,13 +7,12 @@
 #include "vision/kernels/camera_model.h"
 #include "vision/kernels/derotate.h"
 #include "vision/kernels/flow_points.h"
+#include "vision/kernels/frame_rotation.h"
 
 namespace wasp::vision {
 namespace {
 
 using D = FlowFieldDetail;
-
-Quat quat_of(const std::array<float, 4>& q) noexcept { return Quat(q[0], q[1], q[2], q[3]).normalized(); }
 
 bool has_attitude(const BehaviourInput& input) noexcept {
   return input.attitude_valid && attitude_usable(input.attitude.q_ned_body);
@@ -94,8 +90,7 @@ void FlowFieldState::compare(const FlowFieldParams& params, const BehaviourInput
   m.q_ned_body = {1, 0, 0, 0};
   if (has_attitude(input)) m.q_ned_body = input.attitude.q_ned_body;
   if (m.derotated != 0) {
-    const Mat3& R_body_cam = params.camera.R_body_cam;
-    R = R_body_cam.transpose() * (quat_of(m.q_ned_body).conjugate() * last_q_ned_body_).toRotationMatrix() * R_body_cam;
+    R = frame_rotation(params.camera.R_body_cam, last_q_ned_body_, m.q_ned_body);
     derotate(params.camera.lens(), m.seen, R, m.still);
   } else {
     m.still = m.seen;
@@ -115,7 +110,7 @@ void FlowFieldState::keep(const FlowFieldParams& params, const BehaviourInput& i
   has_last_ = true;
   last_at_ns_ = input.exposed_at_ns;
   has_attitude_ = has_attitude(input);
-  if (has_attitude_) last_q_ned_body_ = quat_of(input.attitude.q_ned_body);
+  if (has_attitude_) last_q_ned_body_ = input.attitude.q_ned_body;
   const auto count = static_cast<std::size_t>(cells_);
   const bool registered = input.depth.width_px == width_px_ && input.depth.height_px == height_px_;
   if (!registered ||

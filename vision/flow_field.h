@@ -53,7 +53,7 @@ class FlowFieldState {
   Depths depth_mm_{};  ///< of the last frame, at the centres; 0: unknown
   bool has_last_ = false, has_attitude_ = false, made_ = false;
   TimeNs last_at_ns_ = 0;
-  Quat last_q_ned_body_ = Quat::Identity();
+  std::array<float, 4> last_q_ned_body_{1, 0, 0, 0};
   int cells_with_depth_ = 0;
   FlowMessage message_;
 };
