@@ -111,6 +111,13 @@ TEST(FlowInWorlds, OdometryMeasuresVelocityInTheCorridor) {
   }
 }
 
+/// How far north of the start the wall stands; it is the last face of its world.
+float wall_ahead_m(std::uint32_t seed) {
+  const World world = placed_at_start(make_scene("wall", seed));
+  const Vec3 normal = world.surfaces.back().normal, corner = world.vertices_ned_m[world.quads.back()[0]];
+  return normal.dot(corner) / normal.x();
+}
+
 TEST(FlowInWorlds, AvoidIsRaisedFifteenFramesBeforeAWall) {
   const CameraGeometry camera = camera_of(1.4f, 0.2);
   TimeToContactFront::Params params;
@@ -119,14 +126,12 @@ TEST(FlowInWorlds, AvoidIsRaisedFifteenFramesBeforeAWall) {
     for (const float speed_mps : {0.7f, 1.5f}) {
       Eye<FlowFieldFront> eye("wall", seed, camera);
       TimeToContactFront::State state(params);
-      const float start_m = 10.f - 2.f * speed_mps - 0.05f;  // 60 frames before contact of the camera
+      const float start_m = wall_ahead_m(seed) - 2.f * speed_mps - 0.05f;  // 60 frames before contact of the camera
       float left = 60.f;
       for (bool raised = false; !raised; left -= 1.f) {
         ASSERT_GE(left, 15.f) << seed << " " << speed_mps;
         const float t_s = (60.f - left) * kFrame_s;
-        Euler attitude = wobble(t_s);
-        attitude.yaw_rad += 0.15f;  // the wall is a little slanted
-        const BehaviourInput in = eye.look(Vec3(start_m + speed_mps * t_s, 0.f, -1.f), attitude);
+        const BehaviourInput in = eye.look(Vec3(start_m + speed_mps * t_s, 0.f, -1.f), wobble(t_s));
         raised = TimeToContactFront::step(params, in, state).avoid != 0;
       }
       EXPECT_LT(left, 50.f);

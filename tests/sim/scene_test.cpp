@@ -133,7 +133,7 @@ float widest_gap(const WorldScene& scene, float x, double t) {
 
 TEST(CorridorPeople, LeaveAWayOfOnePointTwoMetresAtAllTimes) {
   for (std::uint32_t seed = 1; seed <= 4; ++seed) {
-    const WorldScene scene(placed_at_start(make_scene("corridor-people", seed)));
+    const WorldScene scene(make_scene("corridor-people", seed).world);  // in the corridor's own frame, not the start's
     ASSERT_EQ(scene.world().movers.size(), 2u);
     for (double t = 0; t < 60; t += 6.7)
       for (const Mover& walker : scene.world().movers)
