@@ -161,7 +161,6 @@ Measures measure_yaw(const FlightTrace& trace, const MissionSetup&, WorldProbe&)
   return m;
 }
 
-/// Frames until the vehicle, flying on as it does at `t`, touches something; NaN if nothing is in its way.
 double frames_to_impact(const Truth& t, const WorldProbe& probe, double rate_hz) {
   const double yaw = euler_of(t).yaw_rad, speed = forward_mps(t);
   Truth ahead = t;

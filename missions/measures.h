@@ -11,6 +11,9 @@ double flown_to_its_end(const FlightTrace& trace);
 
 /// Nothing but whether it was flown.
 Measures measure_flight(const FlightTrace& trace, const MissionSetup& setup, WorldProbe& probe);
+/// Frames at `rate_hz` until the vehicle, flying on as it does at `truth`, touches something; NaN if nothing is in its way.
+double frames_to_impact(const Truth& truth, const WorldProbe& probe, double rate_hz);
+
 Measures measure_hover(const FlightTrace& trace, const MissionSetup& setup, WorldProbe& probe);
 /// Correlation and RMS difference of the visual yaw rate and the gyro's, pair by pair of frames (fig. 5.6).
 Measures measure_yaw(const FlightTrace& trace, const MissionSetup& setup, WorldProbe& probe);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <fstream>
 #include <stdexcept>
 
@@ -80,11 +81,24 @@ Series path(const FlightTrace& trace, const WorldProbe& probe) {
 Series visual_yaw(const FlightTrace& trace, const WorldProbe&) { return yaw_rates(trace, "heading_rate").visual; }
 Series printed_yaw(const FlightTrace& trace, const WorldProbe&) { return yaw_rates(trace, "heading_log_polar").visual; }
 Series gyro_yaw(const FlightTrace& trace, const WorldProbe&) { return yaw_rates(trace, "heading_rate").gyro; }
-Series contact(const FlightTrace& trace, const WorldProbe&) {
+constexpr double kFarthest_frames = 150, kRate_hz = 30;
+
+/// What was measured over what was true, while the vehicle came near.
+Series contact(const FlightTrace& trace, const WorldProbe& probe) {
   Series s;
-  for (const Cue& c : trace.of("time_to_contact"))
-    if (c.body.validity == Validity::kValid && in_flight(trace, c.exposed_at_ns))
-      s.add(trace.seconds(c.exposed_at_ns), static_cast<double>(c.body.detail[vision::TimeToContactFront::kContact_frames]));
+  for (const Cue& c : trace.of("time_to_contact")) {
+    const auto tau = static_cast<double>(c.body.detail[vision::TimeToContactFront::kContact_frames]);
+    const Truth& t = trace.truth_at(c.exposed_at_ns);
+    const double speed = std::hypot(static_cast<double>(t.velocity_ned_mps[0]), static_cast<double>(t.velocity_ned_mps[1]));
+    if (c.body.validity != Validity::kValid || speed < 0.4 || tau <= 0 || tau > kFarthest_frames) continue;
+    if (const double left = frames_to_impact(t, probe, kRate_hz); left <= kFarthest_frames) s.add(left, tau);
+  }
+  return s;
+}
+Series exact_contact(const FlightTrace&, const WorldProbe&) {
+  Series s;
+  s.add(0, 0);
+  s.add(kFarthest_frames, kFarthest_frames);
   return s;
 }
 Series heading_wish(const FlightTrace& trace, const char* behaviour) {
@@ -114,8 +128,8 @@ const std::vector<FigureSet>& sets() {
       {{"turntable", "hover-yaw", "aggressive"},
        {{"gyro", &gyro_yaw}, {"visual: similarity fit", &visual_yaw}, {"visual: log-polar maps", &printed_yaw}},
        {{"yaw_rate", "Yaw rate, inertial and visual", "time [s]", "yaw rate [rad/s]", {"gyro", "visual: similarity fit", "visual: log-polar maps"}}}},
-      {{"wall"}, {{"time to contact", &contact}},
-       {{"time_to_contact", "Time to contact in each approach", "time [s]", "frames", {"time to contact"}}}},
+      {{"wall"}, {{"measured", &contact}, {"exact", &exact_contact}},
+       {{"time_to_contact", "Time to contact in each approach, until it brakes", "true frames to impact", "time to contact [frames]", {"measured", "exact"}}}},
       {{"corridor", "corridor-empty"},
        {{"path", &path}, {"gross (flow balance)", &balance_wish}, {"fine (obstacles)", &obstacle_wish}},
        {{"path", "Ways through the corridor, from above", "along [m]", "across [m]", {"path"}},

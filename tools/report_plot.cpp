@@ -39,6 +39,7 @@ int legend_rows(const Plot& plot) {
   double x = kLeft;
   int rows = 1;
   for (const auto& c : plot.curves) {
+    if (c.name.empty()) continue;
     const double wide = 34 + text_width(c.name);
     if (x > kLeft && x + wide > plot.width - kRight) {
       ++rows;
@@ -148,6 +149,7 @@ void draw_curve(const Curve& curve, const Frame& f, Out out) {
 void draw_legend(const Plot& plot, Out out) {
   double x = kLeft, y = 14;
   for (const auto& c : plot.curves) {
+    if (c.name.empty()) continue;
     const double wide = 34 + text_width(c.name);
     if (x > kLeft && x + wide > plot.width - kRight) {
       x = kLeft;

@@ -16,7 +16,7 @@ struct CurveStyle {
 };
 
 struct Curve {
-  std::string name;
+  std::string name;  ///< empty: no entry in the legend
   CurveStyle style;
   Series series;
 };
