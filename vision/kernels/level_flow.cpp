@@ -19,7 +19,7 @@ Mat3 turn_of(const FlowMessage& m) noexcept {
 }
 
 bool is_rotation(const Mat3& R) noexcept {
-  return R.allFinite() && (R * R.transpose() - Mat3::Identity()).cwiseAbs().maxCoeff() < 0.01f;
+  return R.allFinite() && (R * R.transpose() - Mat3::Identity()).squaredNorm() < 4e-4f;
 }
 
 /// Level axes from the camera's at the second frame.
