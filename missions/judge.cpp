@@ -72,6 +72,7 @@ const std::vector<Judge>& judges() {
         only_told("frames from avoid to impact", Over::kWorstHigh, ""),
         only_told("closest approach", Over::kWorstLow, "m")}},
       {"corridor-empty", &measure_corridor, with(corridor_bars(0), {kStill, kNoFalseAvoid})},
+      {"bee", &measure_corridor, with(corridor_bars(0), {kStill, kNoFalseAvoid, only_told("mean speed", Over::kMean, "m/s")})},
       {"corridor", &measure_corridor, with(corridor_bars(0.01), {only_told("lateral RMS by width", Over::kMean, ""),
                                                                  only_told("false avoids", Over::kSum, "")})},
       {"arena", &measure_arena,

@@ -82,6 +82,10 @@ double rms(const std::vector<double>& v) {
   return v.empty() ? kNone : std::sqrt(sum / static_cast<double>(v.size()));
 }
 
+double mean(const std::vector<double>& v) {
+  return v.empty() ? kNone : std::accumulate(v.begin(), v.end(), 0.0) / static_cast<double>(v.size());
+}
+
 double greatest(const std::vector<double>& v) { return v.empty() ? kNone : *std::max_element(v.begin(), v.end()); }
 
 int avoids_raised(const FlightTrace& trace) {
@@ -200,18 +204,21 @@ Measures measure_wall(const FlightTrace& trace, const MissionSetup& setup, World
 
 Measures measure_corridor(const FlightTrace& trace, const MissionSetup&, WorldProbe& probe) {
   const Nearest near = nearest_along(trace, probe, 1);
-  std::vector<double> lateral;
+  std::vector<double> lateral, speed;
   double way_m = 0;
   for (const Truth* t : on_legs(trace)) {
     const Vec3 at = probe.in_world(*t);
     way_m = std::max(way_m, static_cast<double>(at.x()));
-    if (at.x() > 4) lateral.push_back(static_cast<double>(at.y()));  // what the start was astray is steered away by then
+    if (at.x() <= 4) continue;  // what the start was astray is steered away by then
+    lateral.push_back(static_cast<double>(at.y()));
+    speed.push_back(forward_mps(*t));
   }
   return {{"flown to its end", flown_to_its_end(trace)},
           {"collisions", near.collisions()},
           {"false avoids", avoids_raised(trace)},
           {"least distance", near.around_m},
           {"lateral RMS by width", rms(lateral) / static_cast<double>(sim::kCorridorWidth_m)},
+          {"mean speed", mean(speed)},
           {"way flown", way_m}};
 }
 
@@ -271,7 +278,7 @@ Measures measure_city(const FlightTrace& trace, const MissionSetup&, WorldProbe&
           {"collisions", near.collisions()},
           {"least distance to a box", near.around_m},
           {"mean height over obstacles", near.mean_over_m()},
-          {"mean height", heights.empty() ? kNone : std::accumulate(heights.begin(), heights.end(), 0.0) / static_cast<double>(heights.size())},
+          {"mean height", mean(heights)},
           {"overshoot above the setpoint", heights.empty() ? kNone : overshoot_m},
           {"way flown", way_m}};
 }

@@ -24,6 +24,8 @@ const std::vector<Experiment>& experiments() {
       {"corridor", 100, 4, "Balance and obstacles: corridor with cartons and walking people", "figs 6.8, 6.9",
        "'The large magnitude of motion from the limit cycling exceeded the signal from small obstacles, so they were not "
        "detected reliably.'"},
+      {"bee", 20, 2, "As a bee: centring, speed and heading by image motion alone", "2.1.4.1, 2.1.4.3, 2.1.4.4",
+       "Described of honeybees and flies; not flown."},
       {"hover", 5, 1, "Hover by the ground plane", "fig. 6.20",
        "Regulated its altitude at 0.5 m and 1.0 m for 40 s each, swinging by about 10 cm, quantised by the Hough bins."},
       {"edge-height", 10, 2, "Height from edges in flight, lambda found from climbs", "8.1.3",

@@ -130,7 +130,7 @@ const std::vector<FigureSet>& sets() {
        {{"yaw_rate", "Yaw rate, inertial and visual", "time [s]", "yaw rate [rad/s]", {"gyro", "visual: similarity fit", "visual: log-polar maps"}}}},
       {{"wall"}, {{"measured", &contact}, {"exact", &exact_contact}},
        {{"time_to_contact", "Time to contact in each approach, until it brakes", "true frames to impact", "time to contact [frames]", {"measured", "exact"}}}},
-      {{"corridor", "corridor-empty"},
+      {{"corridor", "corridor-empty", "bee"},
        {{"path", &path}, {"gross (flow balance)", &balance_wish}, {"fine (obstacles)", &obstacle_wish}},
        {{"path", "Ways through the corridor, from above", "along [m]", "across [m]", {"path"}},
         {"heading", "Heading wishes of the gross and the fine process", "time [s]", "yaw rate [rad/s]", {"gross (flow balance)", "fine (obstacles)"}}}},

@@ -34,7 +34,7 @@ TEST_P(Campaign, MeetsItsBars) {
 
 INSTANTIATE_TEST_SUITE_P(Missions, Campaign,
                          ::testing::Values(Short{"turntable", 1, 501}, Short{"hover-yaw", 1, 501}, Short{"aggressive", 1, 501},
-                                           Short{"wall", 3, 501}, Short{"corridor-empty", 2, 501}, Short{"corridor", 2, 501},
+                                           Short{"wall", 3, 501}, Short{"corridor-empty", 2, 501}, Short{"corridor", 2, 501}, Short{"bee", 1, 501},
                                            Short{"arena", 2, 501}, Short{"city-max", 1, 501}, Short{"city-near", 2, 501},
                                            Short{"city-defocus", 1, 501}, Short{"edge-height", 1, 501},
                                            Short{"landing", 1, 501}),
