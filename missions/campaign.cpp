@@ -29,6 +29,32 @@ std::string duration_text(double s) {
   return s < 90 ? fmt::format("{:.0f} s", s) : s < 5400 ? fmt::format("{:.0f} min", s / 60) : fmt::format("{:.1f} h", s / 3600);
 }
 
+/// FFTW's planner, which behaviours call when they are made and unmade, is not for two threads at once.
+std::mutex planner;
+
+sim::LockstepLog fly_alone(const MissionSetup& setup) {
+  sim::LockstepOptions options;
+  std::optional<sim::Lockstep> flight;
+  const auto unmake = [&] {
+    const std::lock_guard lock(planner);
+    flight.reset();
+    options = {};
+  };
+  try {
+    {
+      const std::lock_guard lock(planner);
+      options = lockstep_options(setup);
+    }
+    flight.emplace(options);
+    sim::LockstepLog log = flight->fly(setup.limit_s());
+    unmake();
+    return log;
+  } catch (...) {
+    unmake();
+    throw;
+  }
+}
+
 }  // namespace
 
 double CampaignResult::flown_s() const {
@@ -46,9 +72,7 @@ CampaignRun fly_once(const MissionSetup& setup, const FlightLook& look) {
   CampaignRun run;
   run.seed = setup.sim.seed;
   const TimeNs began_ns = rt::now();
-  sim::Lockstep flight(lockstep_options(setup));
-  const FlightTrace trace =
-      trace_of(flight.fly(setup.limit_s()), scheduling::names_of(all_behaviours()));
+  const FlightTrace trace = trace_of(fly_alone(setup), scheduling::names_of(all_behaviours()));
   run.flight_s = to_seconds(trace.truth.back().exposed_at_ns);
   WorldProbe probe(setup);
   if (look) look(trace, probe);

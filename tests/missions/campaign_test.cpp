@@ -6,6 +6,7 @@
 
 #include <fstream>
 #include <sstream>
+#include <thread>
 
 #include "missions/mission_setup.h"
 #include "tools/mission_files.h"
@@ -54,6 +55,23 @@ TEST(CampaignRuns, AFlightAgainByItsSeedIsTheSameToTheBit) {
     ASSERT_EQ(first.truth[i].position_ned_m, again.truth[i].position_ned_m) << i;
     ASSERT_EQ(first.commands[i].thrust, again.commands[i].thrust) << i;
   }
+}
+
+TEST(CampaignRuns, TwoThreadsMayMakeFourierPlansAtOnce) {
+  MissionSetup setup = load_mission("turntable", 1);
+  setup.flight.control.mission.legs[0].seconds = 1;
+  std::vector<std::string> errors(2);
+  std::vector<std::thread> threads;
+  for (std::string& error : errors)
+    threads.emplace_back([&] {
+      try {
+        (void)fly_once(setup);
+      } catch (const std::exception& e) {
+        error = e.what();
+      }
+    });
+  for (auto& t : threads) t.join();
+  for (const auto& e : errors) EXPECT_EQ(e, "");
 }
 
 TEST(CampaignRuns, AnUnknownMissionListsTheKnownOnes) {
