@@ -138,17 +138,19 @@ class StarvationTest : public ::testing::Test {
 
 TEST_F(StarvationTest, ABehaviourThatSpinsForEverCannotStarveControl) {
   if (!fifo_granted()) GTEST_SKIP() << "SCHED_FIFO is not granted here";
+  bool on_a_quiet_host = false;
   for (int attempt = 0; attempt < 5; ++attempt) {
     const bool quiet_host = fly_beside_spinner(50, 3 * kSecond);
     EXPECT_EQ(demoted_, 1u) << log_;
     EXPECT_EQ(policy_, SCHED_OTHER);
     EXPECT_EQ(state_, static_cast<std::uint32_t>(BehaviourState::kDemoted));
     EXPECT_NE(log_.find("demoted to SCHED_OTHER"), std::string::npos) << log_;
-    if (!quiet_host && skipped_ + missed_ > 0) continue;  // the highest thread overran as well: the host's doing
-    EXPECT_EQ(skipped_, 0u);
-    EXPECT_EQ(missed_, 0u);
-    return;
+    if (skipped_ + missed_ == 0) return;
+    // Until the spinner is demoted the kernel's fair server may take the core for threads it starved, control's with it,
+    // and the more of them a busy machine runs the likelier; a control thread that is starved loses ticks every time.
+    on_a_quiet_host = on_a_quiet_host || quiet_host;
   }
+  if (on_a_quiet_host) FAIL() << "ticks lost in every attempt; in the last " << skipped_ << " skipped, " << missed_ << " missed";
   GTEST_SKIP() << "the host stood still in every attempt: nothing can be said of missed ticks";
 }
 
