@@ -170,9 +170,8 @@ Setpoint wanted_setpoint(const ControlParams& p, const ControlInput& in, const I
   }
   const float forward_mps = avoiding(p, in, s) ? 0.f : wish.forward_mps;
   const bool moving = velocity_known(p, in, s);
-  const Tilt tilt =
-      velocity_hold_step(p.velocity_hold, forward_mps, moving, s.velocity.velocity_mps, s.sent.yaw_rate_radps, in.dt_s,
-                         s.velocity_hold);
+  const Tilt tilt = velocity_hold_step(p.velocity_hold, forward_mps, moving, s.velocity.velocity_mps,
+                                       s.sent.yaw_rate_radps, in.dt_s, s.velocity_hold);
   wanted.roll_rad = tilt.roll_rad + wish.roll_rad;
   wanted.pitch_rad = wanted_pitch(p, in, intention, wish, tilt.pitch_rad, s);
   wanted.yaw_rate_radps = wanted_yaw_rate(p, in, intention, wish, s);

@@ -31,8 +31,8 @@ struct Tilt {
 };
 
 /// One period towards `forward_mps`. `measured` where `is_known`; otherwise level, and integral and ramp start anew. A
-/// turn at `yaw_rate_radps` (as commanded: it takes as long to come as the roll) is banked for, v times the rate, or the
-/// way over ground would follow the heading late and steering by heading would swing. Realtime-safe: yes.
+/// turn at `yaw_rate_radps` (as commanded: it takes as long to come as the roll) is banked for, v times the rate, or
+/// the way over ground would follow the heading late and steering by heading would swing. Realtime-safe: yes.
 Tilt velocity_hold_step(const VelocityHoldParams& params, float forward_mps, bool is_known, LevelVelocity measured,
                         float yaw_rate_radps, float dt_s, VelocityHoldState& state) WASP_REALTIME;
 

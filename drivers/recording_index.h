@@ -15,7 +15,8 @@ std::vector<ListedFrame> pair_frames(const std::vector<ListedFrame>& depth, cons
                                      DurationNs tolerance_ns);
 
 /// Applies camera.toml to `listing`. Keys: width_px, height_px, fx_px, fy_px, cx_px, cy_px, k1, k2, p1, p2, k3, lens,
-/// fisheye_k, pitch_down_deg, depth_units_per_m, rate_hz, position_body_m. Throws on syntax errors, unknown keys and values out of range.
+/// fisheye_k, pitch_down_deg, depth_units_per_m, rate_hz, position_body_m. Throws on syntax errors, unknown keys and
+/// values out of range.
 void read_camera_toml(const std::filesystem::path& file, Listing& listing);
 
 /// The number a file name ends in before its extensions ("frame-000060.depth.png" -> 60), if it ends in one.

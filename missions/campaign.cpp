@@ -26,7 +26,9 @@ std::string quoted(const std::string& text) {
 }
 
 std::string duration_text(double s) {
-  return s < 90 ? fmt::format("{:.0f} s", s) : s < 5400 ? fmt::format("{:.0f} min", s / 60) : fmt::format("{:.1f} h", s / 3600);
+  return s < 90     ? fmt::format("{:.0f} s", s)
+         : s < 5400 ? fmt::format("{:.0f} min", s / 60)
+                    : fmt::format("{:.1f} h", s / 3600);
 }
 
 /// FFTW's planner, which behaviours call when they are made and unmade, is not for two threads at once.
@@ -81,8 +83,8 @@ CampaignRun fly_once(const MissionSetup& setup, const FlightLook& look) {
   return run;
 }
 
-CampaignResult fly_campaign(const CampaignOptions& options, const std::function<void(const CampaignProgress&)>& on_progress,
-                            const FlightKeep& keep) {
+CampaignResult fly_campaign(const CampaignOptions& options,
+                            const std::function<void(const CampaignProgress&)>& on_progress, const FlightKeep& keep) {
   (void)load_mission(options.mission, options.first_seed, options.configs);  // errors before any thread
   CampaignResult result{options, std::vector<CampaignRun>(static_cast<std::size_t>(options.runs)), 0, {}};
   const TimeNs began_ns = rt::now();
@@ -94,11 +96,12 @@ CampaignResult fly_campaign(const CampaignOptions& options, const std::function<
       const std::uint32_t seed = options.first_seed + static_cast<std::uint32_t>(i);
       CampaignRun& run = result.runs[static_cast<std::size_t>(i)];
       try {
-        run = fly_once(load_mission(options.mission, seed, options.configs), [&](const FlightTrace& trace, const WorldProbe& probe) {
-          if (!keep) return;
-          const std::lock_guard lock(mutex);
-          keep(seed, trace, probe);
-        });
+        run = fly_once(load_mission(options.mission, seed, options.configs),
+                       [&](const FlightTrace& trace, const WorldProbe& probe) {
+                         if (!keep) return;
+                         const std::lock_guard lock(mutex);
+                         keep(seed, trace, probe);
+                       });
       } catch (const std::exception& e) {
         run.seed = seed;
         run.error = e.what();

@@ -53,9 +53,10 @@ using FlightKeep = std::function<void(std::uint32_t seed, const FlightTrace&, co
 /// One flight. The trace is handed to `look`, if given, before it is judged.
 CampaignRun fly_once(const MissionSetup& setup, const FlightLook& look = {});
 
-/// Flies all runs. `on_progress` is called after each, from one thread at a time; `keep` (optional) is given every trace
-/// likewise. A run that cannot be flown is noted and fails the campaign. Throws what load_mission throws.
-CampaignResult fly_campaign(const CampaignOptions& options, const std::function<void(const CampaignProgress&)>& on_progress,
+/// Flies all runs. `on_progress` is called after each, from one thread at a time; `keep` (optional) is given every
+/// trace likewise. A run that cannot be flown is noted and fails the campaign. Throws what load_mission throws.
+CampaignResult fly_campaign(const CampaignOptions& options,
+                            const std::function<void(const CampaignProgress&)>& on_progress,
                             const FlightKeep& keep = {});
 
 /// One line a run: seed, seconds, every figure. Written beside itself first, then renamed. Throws naming the file.

@@ -1,8 +1,8 @@
-// wasp-campaign: many flights of one mission in lockstep on virtual time; a table of figures against their bars, a line a
-// flight in CSV, and any flight again by its seed.
-#include <CLI/CLI.hpp>
+// wasp-campaign: many flights of one mission in lockstep on virtual time; a table of figures against their bars, a line
+// a flight in CSV, and any flight again by its seed.
 #include <fmt/format.h>
 #include <unistd.h>
+#include <CLI/CLI.hpp>
 
 #include <fstream>
 #include <iostream>
@@ -34,7 +34,9 @@ std::optional<int> parse(int argc, char** argv, Options& o) {
   app.add_option("MISSION", o.campaign.mission, "a folder of config/missions; --list names them");
   app.add_option("--runs", o.campaign.runs, "flights")->check(CLI::Range(1, 1'000'000));
   app.add_option("--seed", o.campaign.first_seed, "of the first flight; each further one has the next");
-  app.add_option("--only", o.only_seed, "fly this seed alone, the same to the bit as in a campaign; with --out its trace and cues are kept too");
+  app.add_option(
+      "--only", o.only_seed,
+      "fly this seed alone, the same to the bit as in a campaign; with --out its trace and cues are kept too");
   app.add_option("--jobs", o.campaign.jobs, "threads")->check(CLI::Range(1, 256));
   app.add_option("--config", o.campaign.configs, "further flight configuration, read last")->check(CLI::ExistingFile);
   app.add_option("--out", o.out, "folder for runs.csv and figures (default: none is written)");
@@ -55,8 +57,11 @@ void print_results(const CampaignResult& result, bool json) {
     if (json)
       std::cout << tools::to_json(r).dump() << "\n";
     else
-      std::cout << fmt::format("{:<4} {:<48} {:>10.4g} {:<5} {}\n", r.bar.empty() ? "" : r.ok ? "ok" : "MISS", r.name, r.value,
-                               r.unit, r.bar.empty() ? "" : "bar " + r.bar);
+      std::cout << fmt::format("{:<4} {:<48} {:>10.4g} {:<5} {}\n",
+                               r.bar.empty() ? ""
+                               : r.ok        ? "ok"
+                                             : "MISS",
+                               r.name, r.value, r.unit, r.bar.empty() ? "" : "bar " + r.bar);
   }
   for (const auto& run : result.runs)
     if (!run.error.empty()) std::cerr << fmt::format("seed {}: {}\n", run.seed, run.error);
@@ -76,15 +81,17 @@ int run(const Options& o) {
   const auto progress = [&](const CampaignProgress& p) {
     if (!terminal && p.done < p.runs && p.elapsed_s - printed_s < 10) return;
     printed_s = p.elapsed_s;
-    std::cerr << (terminal ? "\r\033[K" : "") << progress_text(p) << (terminal && p.done < p.runs ? "" : "\n") << std::flush;
+    std::cerr << (terminal ? "\r\033[K" : "") << progress_text(p) << (terminal && p.done < p.runs ? "" : "\n")
+              << std::flush;
   };
   RunFigures figures(o.campaign.mission);
-  const CampaignResult result = fly_campaign(o.campaign, progress, [&](std::uint32_t seed, const FlightTrace& trace, const WorldProbe& probe) {
-    if (!o.out.empty()) figures.add(seed, trace, probe);
-    if (o.out.empty() || !o.only_seed) return;
-    write_trace_csv(trace, probe, o.out / fmt::format("trace-{}.csv", seed));
-    write_cues_csv(trace, o.out / fmt::format("cues-{}.csv", seed));
-  });
+  const CampaignResult result =
+      fly_campaign(o.campaign, progress, [&](std::uint32_t seed, const FlightTrace& trace, const WorldProbe& probe) {
+        if (!o.out.empty()) figures.add(seed, trace, probe);
+        if (o.out.empty() || !o.only_seed) return;
+        write_trace_csv(trace, probe, o.out / fmt::format("trace-{}.csv", seed));
+        write_cues_csv(trace, o.out / fmt::format("cues-{}.csv", seed));
+      });
   print_results(result, o.json);
   if (!o.out.empty()) {
     write_csv(result, o.out / "runs.csv");

@@ -62,11 +62,16 @@ std::vector<Truth> read_truth(const fs::path& file) {
   const Columns c(file);
   std::vector<Truth> rows(c.rows());
   c.integer("exposed_at_ns", rows, [](Truth& t) -> TimeNs& { return t.exposed_at_ns; });
-  c.array("position_", std::array{"north_m", "east_m", "down_m"}, rows, [](Truth& t) -> auto& { return t.position_ned_m; });
-  c.array("velocity_", std::array{"north_mps", "east_mps", "down_mps"}, rows,
-          [](Truth& t) -> auto& { return t.velocity_ned_mps; });
-  c.array("q_", kQ, rows, [](Truth& t) -> auto& { return t.q_ned_body; });
-  c.array("rate_", kXyzRate, rows, [](Truth& t) -> auto& { return t.rate_body_radps; });
+  c.array(
+      "position_", std::array{"north_m", "east_m", "down_m"}, rows,
+      [](Truth & t) -> auto& { return t.position_ned_m; });
+  c.array(
+      "velocity_", std::array{"north_mps", "east_mps", "down_mps"}, rows,
+      [](Truth & t) -> auto& { return t.velocity_ned_mps; });
+  c.array(
+      "q_", kQ, rows, [](Truth & t) -> auto& { return t.q_ned_body; });
+  c.array(
+      "rate_", kXyzRate, rows, [](Truth & t) -> auto& { return t.rate_body_radps; });
   c.number("height_m", rows, [](Truth& t) -> float& { return t.height_m; });
   c.number("armed", rows, [](Truth& t) -> float& { return t.armed; });
   c.number("flight_time_s", rows, [](Truth& t) -> float& { return t.flight_time_s; });
@@ -79,7 +84,8 @@ std::vector<Command> read_commands(const fs::path& file) {
   c.integer("exposed_at_ns", rows, [](Command& x) -> TimeNs& { return x.exposed_at_ns; });
   c.integer("due_at_ns", rows, [](Command& x) -> TimeNs& { return x.due_at_ns; });
   c.integer("written_at_ns", rows, [](Command& x) -> TimeNs& { return x.written_at_ns; });
-  c.array("q_", kQ, rows, [](Command& x) -> auto& { return x.q_ned_body; });
+  c.array(
+      "q_", kQ, rows, [](Command & x) -> auto& { return x.q_ned_body; });
   c.number("yaw_rate_radps", rows, [](Command& x) -> float& { return x.yaw_rate_radps; });
   c.number("thrust", rows, [](Command& x) -> float& { return x.thrust; });
   c.number("height_setpoint_m", rows, [](Command& x) -> float& { return x.height_setpoint_m; });
@@ -102,8 +108,10 @@ std::map<std::string, std::vector<Cue>> read_cues(const fs::path& file) {
   c.integer("finished_at_ns", rows, [](Cue& x) -> TimeNs& { return x.finished_at_ns; });
   c.integer("frame_sequence", rows, [](Cue& x) -> std::uint32_t& { return x.frame_sequence; });
   c.integer("over_budget", rows, [](Cue& x) -> std::uint32_t& { return x.over_budget; });
-  c.array("q_", kQ, rows, [](Cue& x) -> auto& { return x.q_ned_body; });
-  c.array("rate_", kXyzRate, rows, [](Cue& x) -> auto& { return x.rate_body_radps; });
+  c.array(
+      "q_", kQ, rows, [](Cue & x) -> auto& { return x.q_ned_body; });
+  c.array(
+      "rate_", kXyzRate, rows, [](Cue & x) -> auto& { return x.rate_body_radps; });
   c.integer("validity", rows, [](Cue& x) -> Validity& { return x.body.validity; });
   c.integer("has_height", rows, [](Cue& x) -> std::uint8_t& { return x.body.has_height; });
   c.integer("has_heading_rate", rows, [](Cue& x) -> std::uint8_t& { return x.body.has_heading_rate; });
@@ -120,7 +128,9 @@ std::map<std::string, std::vector<Cue>> read_cues(const fs::path& file) {
   c.number("velocity_right_mps", rows, [](Cue& x) -> float& { return x.body.velocity_right_mps; });
   c.number("climb_mps", rows, [](Cue& x) -> float& { return x.body.climb_mps; });
   c.number("climb_1ps", rows, [](Cue& x) -> float& { return x.body.climb_1ps; });
-  c.array("detail_", std::array{"0", "1", "2", "3", "4", "5", "6", "7"}, rows, [](Cue& x) -> auto& { return x.body.detail; });
+  c.array(
+      "detail_", std::array{"0", "1", "2", "3", "4", "5", "6", "7"}, rows,
+      [](Cue & x) -> auto& { return x.body.detail; });
   std::map<std::string, std::vector<Cue>> by_name;
   const auto names = c.texts("behaviour");
   for (std::size_t i = 0; i < rows.size(); ++i) by_name[names[i]].push_back(rows[i]);
@@ -131,15 +141,18 @@ std::vector<ImuSample> read_imu(const fs::path& file) {
   const Columns c(file);
   std::vector<ImuSample> rows(c.rows());
   c.integer("exposed_at_ns", rows, [](ImuSample& x) -> TimeNs& { return x.exposed_at_ns; });
-  c.array("accel_", std::array{"x_body_mps2", "y_body_mps2", "z_body_mps2"}, rows,
-          [](ImuSample& x) -> auto& { return x.accel_body_mps2; });
-  c.array("gyro_", kXyzRate, rows, [](ImuSample& x) -> auto& { return x.gyro_body_radps; });
+  c.array(
+      "accel_", std::array{"x_body_mps2", "y_body_mps2", "z_body_mps2"}, rows,
+      [](ImuSample & x) -> auto& { return x.accel_body_mps2; });
+  c.array(
+      "gyro_", kXyzRate, rows, [](ImuSample & x) -> auto& { return x.gyro_body_radps; });
   return rows;
 }
 
 void finish(FlightTrace& trace) {
   for (auto& [name, cues] : trace.cues)
-    std::stable_sort(cues.begin(), cues.end(), [](const Cue& a, const Cue& b) { return a.exposed_at_ns < b.exposed_at_ns; });
+    std::stable_sort(cues.begin(), cues.end(),
+                     [](const Cue& a, const Cue& b) { return a.exposed_at_ns < b.exposed_at_ns; });
   if (trace.truth.empty()) throw std::runtime_error("the flight has no truth");
   for (const Truth& t : trace.truth)
     if (trace.lift_off_ns == kNever && t.flight_time_s > 0)
@@ -191,7 +204,8 @@ TruthEuler euler_of(const Truth& t) {
 
 void write_trace_csv(const FlightTrace& trace, const WorldProbe& probe, const fs::path& file) {
   std::ofstream out(file);
-  out << "t_s,north_m,east_m,height_m,roll_rad,pitch_rad,yaw_rad,forward_mps,setpoint_m,estimate_m,velocity_forward_mps,"
+  out << "t_s,north_m,east_m,height_m,roll_rad,pitch_rad,yaw_rad,forward_mps,setpoint_m,estimate_m,velocity_forward_"
+         "mps,"
          "velocity_right_mps,yaw_rate_radps,avoid,mode,phase,world_north_m,world_east_m\n";
   for (const Command& c : trace.commands) {
     const Truth& t = trace.truth_at(c.due_at_ns);
@@ -199,10 +213,12 @@ void write_trace_csv(const FlightTrace& trace, const WorldProbe& probe, const fs
     const Vec3 at = probe.in_world(t);
     const double forward = static_cast<double>(t.velocity_ned_mps[0]) * std::cos(e.yaw_rad) +
                            static_cast<double>(t.velocity_ned_mps[1]) * std::sin(e.yaw_rad);
-    out << fmt::format("{:.3f},{:.4f},{:.4f},{:.4f},{:.5f},{:.5f},{:.5f},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{},{},{},{:.4f},{:.4f}\n",
-                       trace.seconds(c.due_at_ns), t.position_ned_m[0], t.position_ned_m[1], t.height_m, e.roll_rad,
-                       e.pitch_rad, e.yaw_rad, forward, c.height_setpoint_m, c.height_m, c.velocity_forward_mps,
-                       c.velocity_right_mps, c.yaw_rate_radps, c.avoid, static_cast<int>(c.mode), c.mission_phase, at.x(), at.y());
+    out << fmt::format(
+        "{:.3f},{:.4f},{:.4f},{:.4f},{:.5f},{:.5f},{:.5f},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{},{},{},{:.4f},{:."
+        "4f}\n",
+        trace.seconds(c.due_at_ns), t.position_ned_m[0], t.position_ned_m[1], t.height_m, e.roll_rad, e.pitch_rad,
+        e.yaw_rad, forward, c.height_setpoint_m, c.height_m, c.velocity_forward_mps, c.velocity_right_mps,
+        c.yaw_rate_radps, c.avoid, static_cast<int>(c.mode), c.mission_phase, at.x(), at.y());
   }
   if (!out.flush()) throw std::runtime_error("cannot write " + file.string());
 }

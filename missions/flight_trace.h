@@ -18,11 +18,11 @@ namespace wasp::missions {
 class WorldProbe;
 
 struct FlightTrace {
-  std::vector<Truth> truth;       ///< 20 Hz from lockstep, 200 Hz from logs
-  std::vector<Command> commands;  ///< one a control tick
+  std::vector<Truth> truth;                      ///< 20 Hz from lockstep, 200 Hz from logs
+  std::vector<Command> commands;                 ///< one a control tick
   std::map<std::string, std::vector<Cue>> cues;  ///< by behaviour, in order of exposure
-  std::vector<ImuSample> imu;     ///< as the companion heard it
-  TimeNs lift_off_ns = kNever;    ///< the vehicle first left the ground
+  std::vector<ImuSample> imu;                    ///< as the companion heard it
+  TimeNs lift_off_ns = kNever;                   ///< the vehicle first left the ground
 
   [[nodiscard]] double seconds(TimeNs at_ns) const;  ///< since lift-off; before it negative
   /// Cues of a behaviour; none if it did not run.

@@ -1,5 +1,5 @@
-// What each mission must show: figures taken from one flight's trace, and the bars they are held against, over one flight
-// or a hundred. The same judge judges lockstep and the real process.
+// What each mission must show: figures taken from one flight's trace, and the bars they are held against, over one
+// flight or a hundred. The same judge judges lockstep and the real process.
 #pragma once
 
 #include <string>
@@ -23,7 +23,7 @@ struct Bar {
   const char* measure;
   Over over;
   const char* unit;
-  bool at_most;  ///< else at least
+  bool at_most;          ///< else at least
   double bound;          ///< NaN: no bar, only reported
   bool if_told = false;  ///< left out where no flight tells it (what lockstep cannot measure)
 };
@@ -37,7 +37,8 @@ struct Judge {
 /// The judge of a mission; one that has no row of its own must be flown to its end.
 const Judge& judge_of(const std::string& mission);
 
-/// Holds the figures of `runs` flights against the bars. A figure that is NaN in any run misses its bar; no runs miss all.
+/// Holds the figures of `runs` flights against the bars. A figure that is NaN in any run misses its bar; no runs miss
+/// all.
 std::vector<tools::Result> verdict(const Judge& judge, const std::vector<Measures>& runs);
 
 /// NaN when there is no such figure.

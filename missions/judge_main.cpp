@@ -1,4 +1,5 @@
-// wasp-judge: holds a recorded flight of a mission against the mission's bars; what `wasp fly --mission` asks at its end.
+// wasp-judge: holds a recorded flight of a mission against the mission's bars; what `wasp fly --mission` asks at its
+// end.
 #include <CLI/CLI.hpp>
 #include <iostream>
 #include <stdexcept>
@@ -18,7 +19,8 @@ int main(int argc, char** argv) {
   app.add_option("FOLDER", folder, "of the run; its log/ is read")->required()->check(CLI::ExistingDirectory);
   app.add_option("--seed", seed, "of the simulated world it was flown in")->capture_default_str();
   app.add_option("--config", configs, "further flight configuration it was flown with")->check(CLI::ExistingFile);
-  app.add_option("--world", world, "VRML97 file it was flown in instead of the mission's world")->check(CLI::ExistingFile);
+  app.add_option("--world", world, "VRML97 file it was flown in instead of the mission's world")
+      ->check(CLI::ExistingFile);
   CLI11_PARSE(app, argc, argv);
   try {
     MissionSetup setup = load_mission(mission, seed, configs);

@@ -24,7 +24,8 @@ double height_m(const Truth& t) { return static_cast<double>(t.height_m); }
 /// Forward speed over ground along the heading.
 double forward_mps(const Truth& t) {
   const double yaw = euler_of(t).yaw_rad;
-  return static_cast<double>(t.velocity_ned_mps[0]) * std::cos(yaw) + static_cast<double>(t.velocity_ned_mps[1]) * std::sin(yaw);
+  return static_cast<double>(t.velocity_ned_mps[0]) * std::cos(yaw) +
+         static_cast<double>(t.velocity_ned_mps[1]) * std::sin(yaw);
 }
 
 /// Truth of the stretch on mission legs.
@@ -116,7 +117,8 @@ Measures measure_hover(const FlightTrace& trace, const MissionSetup& setup, Worl
   for (const LegSpan& leg : legs_of(trace)) {
     const TimeNs from_ns = trace.commands[leg.first].due_at_ns + from_seconds(kSettle_s);
     const TimeNs to_ns = trace.commands[leg.last].due_at_ns;
-    const double setpoint_m = static_cast<double>(setup.flight.control.mission.legs[static_cast<std::size_t>(leg.leg)].height_m);
+    const double setpoint_m =
+        static_cast<double>(setup.flight.control.mission.legs[static_cast<std::size_t>(leg.leg)].height_m);
     std::vector<double> errors;
     for (const Truth& t : trace.truth)
       if (t.exposed_at_ns >= from_ns && t.exposed_at_ns <= to_ns) errors.push_back(height_m(t) - setpoint_m);

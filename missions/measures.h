@@ -11,7 +11,8 @@ double flown_to_its_end(const FlightTrace& trace);
 
 /// Nothing but whether it was flown.
 Measures measure_flight(const FlightTrace& trace, const MissionSetup& setup, WorldProbe& probe);
-/// Frames at `rate_hz` until the vehicle, flying on as it does at `truth`, touches something; NaN if nothing is in its way.
+/// Frames at `rate_hz` until the vehicle, flying on as it does at `truth`, touches something; NaN if nothing is in its
+/// way.
 double frames_to_impact(const Truth& truth, const WorldProbe& probe, double rate_hz);
 
 Measures measure_hover(const FlightTrace& trace, const MissionSetup& setup, WorldProbe& probe);

@@ -1,5 +1,5 @@
-// The thesis' experiments, all of them, again: which missions, how many flights, which of its figures they stand for and
-// what it said of them; and the one page that shows ours beside that.
+// The thesis' experiments, all of them, again: which missions, how many flights, which of its figures they stand for
+// and what it said of them; and the one page that shows ours beside that.
 #pragma once
 
 #include <filesystem>

@@ -1,8 +1,8 @@
 // wasp-reproduce: flies every experiment of the thesis in lockstep, and writes one page with a figure for each of its
 // figures, its result quoted beside ours.
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <unistd.h>
+#include <CLI/CLI.hpp>
 
 #include <algorithm>
 #include <fstream>
@@ -29,7 +29,8 @@ struct Options {
 
 std::optional<int> parse(int argc, char** argv, Options& o) {
   CLI::App app{
-      "Flies every experiment of the thesis in lockstep on virtual time and writes OUT/index.html, a CSV and the figures\n"
+      "Flies every experiment of the thesis in lockstep on virtual time and writes OUT/index.html, a CSV and the "
+      "figures\n"
       "of each. About an hour on two cores; --quick: a few flights of each, some minutes. Exit code 0: every bar met."};
   app.name("wasp reproduce");
   app.option_defaults()->always_capture_default();
@@ -78,7 +79,10 @@ ExperimentResult fly_experiment(const Experiment& e, const Options& o) {
 }
 
 ExperimentResult study_edges(const Options& o) {
-  static const Experiment kEdges{"edges", 0, 0, "Height from edge statistics: three fields of view, lambda swept",
+  static const Experiment kEdges{"edges",
+                                 0,
+                                 0,
+                                 "Height from edge statistics: three fields of view, lambda swept",
                                  "figs 7.8 to 7.12",
                                  "Lambda = 0.35 best estimates the height in the virtual world; a larger field of view "
                                  "under-estimates height with less variance."};
@@ -91,14 +95,17 @@ ExperimentResult study_edges(const Options& o) {
   ExperimentResult result;
   result.experiment = &kEdges;
   for (const auto& f : study.fits)
-    result.campaign.results.push_back({fmt::format("RMS height error by height, {} degrees, lambda {:.2f}", f.fov_deg, f.edges_per_m),
-                                       f.rms_share, "", "", true});
+    result.campaign.results.push_back(
+        {fmt::format("RMS height error by height, {} degrees, lambda {:.2f}", f.fov_deg, f.edges_per_m), f.rms_share,
+         "", "", true});
   result.figures = {{"7.8: estimated against true height for several lambda", tools::edge_figure_7_8(study)},
                     {"7.10: estimated against true height, three fields of view", tools::edge_figure_7_10(study)},
                     {"7.11: row of most edges against height", tools::edge_figure_7_11(study)}};
   for (const double fov : options.fovs_deg) {
-    result.figures.emplace_back(fmt::format("7.9: cumulative distribution and model, {} degrees", fov), tools::edge_figure_7_9(study, fov));
-    result.figures.emplace_back(fmt::format("7.12: modelled density, {} degrees", fov), tools::edge_figure_7_12(study, fov));
+    result.figures.emplace_back(fmt::format("7.9: cumulative distribution and model, {} degrees", fov),
+                                tools::edge_figure_7_9(study, fov));
+    result.figures.emplace_back(fmt::format("7.12: modelled density, {} degrees", fov),
+                                tools::edge_figure_7_12(study, fov));
   }
   result.figures.emplace_back("Lambda found from climbs (8.1.3)", tools::edge_figure_lambda(study));
   return result;
@@ -128,18 +135,22 @@ void compare(std::vector<ExperimentResult>& results, const Options& o) {
       r.campaign.results.push_back({"mean height over obstacles, share of maximum peak's", share, "",
                                     judged ? fmt::format("<= {}", kWellBelow) : "", !judged || share <= kWellBelow});
       if (!judged && share > kWellBelow)
-        r.remarks.push_back("Defocus does not tell near from far here: roofs against the bright sky stay strong edges when blurred.");
+        r.remarks.push_back(
+            "Defocus does not tell near from far here: roofs against the bright sky stay strong edges when blurred.");
     }
     if (!o.quick && o.jobs >= 2)
-      r.campaign.results.push_back({"speed of the campaign", r.campaign.speed_up(), "x real time", fmt::format(">= {}", kLeastSpeedUp),
-                                    r.campaign.speed_up() >= kLeastSpeedUp});
+      r.campaign.results.push_back({"speed of the campaign", r.campaign.speed_up(), "x real time",
+                                    fmt::format(">= {}", kLeastSpeedUp), r.campaign.speed_up() >= kLeastSpeedUp});
   }
 }
 
 void print(const ExperimentResult& r) {
   for (const auto& x : r.campaign.results)
-    std::cout << fmt::format("{:<4} {:<16} {:<52} {:>10.4g} {:<12} {}\n", x.bar.empty() ? "" : x.ok ? "ok" : "MISS", r.experiment->mission,
-                             x.name, x.value, x.unit, x.bar.empty() ? "" : "bar " + x.bar);
+    std::cout << fmt::format("{:<4} {:<16} {:<52} {:>10.4g} {:<12} {}\n",
+                             x.bar.empty() ? ""
+                             : x.ok        ? "ok"
+                                           : "MISS",
+                             r.experiment->mission, x.name, x.value, x.unit, x.bar.empty() ? "" : "bar " + x.bar);
   std::cout << std::flush;
 }
 
@@ -149,7 +160,8 @@ int run(const Options& o) {
     return o.only.empty() || std::find(o.only.begin(), o.only.end(), name) != o.only.end();
   };
   for (const auto& name : o.only)
-    if (name != "edges" && std::none_of(experiments().begin(), experiments().end(), [&](const auto& e) { return name == e.mission; }))
+    if (name != "edges" &&
+        std::none_of(experiments().begin(), experiments().end(), [&](const auto& e) { return name == e.mission; }))
       throw std::runtime_error("no experiment '" + name + "'");
   std::vector<ExperimentResult> results;
   if (wanted("edges")) results.push_back(study_edges(o));

@@ -36,7 +36,9 @@ struct FigureSet {
   std::vector<PlotKind> plots;
 };
 
-bool in_flight(const FlightTrace& trace, TimeNs at_ns) { return trace.lift_off_ns != kNever && at_ns >= trace.lift_off_ns; }
+bool in_flight(const FlightTrace& trace, TimeNs at_ns) {
+  return trace.lift_off_ns != kNever && at_ns >= trace.lift_off_ns;
+}
 
 Series height_over_time(const FlightTrace& trace, const WorldProbe&) {
   Series s;
@@ -47,20 +49,23 @@ Series height_over_time(const FlightTrace& trace, const WorldProbe&) {
 Series setpoint_over_time(const FlightTrace& trace, const WorldProbe&) {
   Series s;
   for (const Command& c : trace.commands)
-    if (in_flight(trace, c.due_at_ns) && c.height_setpoint_m > 0) s.add(trace.seconds(c.due_at_ns), static_cast<double>(c.height_setpoint_m));
+    if (in_flight(trace, c.due_at_ns) && c.height_setpoint_m > 0)
+      s.add(trace.seconds(c.due_at_ns), static_cast<double>(c.height_setpoint_m));
   return s;
 }
 Series height_over_way(const FlightTrace& trace, const WorldProbe&) {
   Series s;
   for (const Truth& t : trace.truth)
-    if (in_flight(trace, t.exposed_at_ns)) s.add(static_cast<double>(t.position_ned_m[0]), -static_cast<double>(t.position_ned_m[2]));
+    if (in_flight(trace, t.exposed_at_ns))
+      s.add(static_cast<double>(t.position_ned_m[0]), -static_cast<double>(t.position_ned_m[2]));
   return s;
 }
 Series setpoint_over_way(const FlightTrace& trace, const WorldProbe&) {
   Series s;
   for (const Command& c : trace.commands)
     if (in_flight(trace, c.due_at_ns) && c.height_setpoint_m > 0)
-      s.add(static_cast<double>(trace.truth_at(c.due_at_ns).position_ned_m[0]), static_cast<double>(c.height_setpoint_m));
+      s.add(static_cast<double>(trace.truth_at(c.due_at_ns).position_ned_m[0]),
+            static_cast<double>(c.height_setpoint_m));
   return s;
 }
 Series skyline(const FlightTrace& trace, const WorldProbe& probe) {
@@ -89,7 +94,8 @@ Series contact(const FlightTrace& trace, const WorldProbe& probe) {
   for (const Cue& c : trace.of("time_to_contact")) {
     const auto tau = static_cast<double>(c.body.detail[vision::TimeToContactFront::kContact_frames]);
     const Truth& t = trace.truth_at(c.exposed_at_ns);
-    const double speed = std::hypot(static_cast<double>(t.velocity_ned_mps[0]), static_cast<double>(t.velocity_ned_mps[1]));
+    const double speed =
+        std::hypot(static_cast<double>(t.velocity_ned_mps[0]), static_cast<double>(t.velocity_ned_mps[1]));
     if (c.body.validity != Validity::kValid || speed < 0.4 || tau <= 0 || tau > kFarthest_frames) continue;
     if (const double left = frames_to_impact(t, probe, kRate_hz); left <= kFarthest_frames) s.add(left, tau);
   }
@@ -113,13 +119,15 @@ Series obstacle_wish(const FlightTrace& trace, const WorldProbe&) { return headi
 Series edge_height_cue(const FlightTrace& trace, const WorldProbe&) {
   Series s;
   for (const Cue& c : trace.of("edge_altitude"))
-    if (c.body.has_height != 0 && in_flight(trace, c.exposed_at_ns)) s.add(trace.seconds(c.exposed_at_ns), static_cast<double>(c.body.height_m));
+    if (c.body.has_height != 0 && in_flight(trace, c.exposed_at_ns))
+      s.add(trace.seconds(c.exposed_at_ns), static_cast<double>(c.body.height_m));
   return s;
 }
 Series ground_height_cue(const FlightTrace& trace, const WorldProbe&) {
   Series s;
   for (const Cue& c : trace.of("ground_altitude"))
-    if (c.body.has_height != 0 && in_flight(trace, c.exposed_at_ns)) s.add(trace.seconds(c.exposed_at_ns), static_cast<double>(c.body.height_m));
+    if (c.body.has_height != 0 && in_flight(trace, c.exposed_at_ns))
+      s.add(trace.seconds(c.exposed_at_ns), static_cast<double>(c.body.height_m));
   return s;
 }
 
@@ -127,22 +135,48 @@ const std::vector<FigureSet>& sets() {
   static const std::vector<FigureSet> kSets{
       {{"turntable", "hover-yaw", "aggressive"},
        {{"gyro", &gyro_yaw}, {"visual: similarity fit", &visual_yaw}, {"visual: log-polar maps", &printed_yaw}},
-       {{"yaw_rate", "Yaw rate, inertial and visual", "time [s]", "yaw rate [rad/s]", {"gyro", "visual: similarity fit", "visual: log-polar maps"}}}},
-      {{"wall"}, {{"measured", &contact}, {"exact", &exact_contact}},
-       {{"time_to_contact", "Time to contact in each approach, until it brakes", "true frames to impact", "time to contact [frames]", {"measured", "exact"}}}},
+       {{"yaw_rate",
+         "Yaw rate, inertial and visual",
+         "time [s]",
+         "yaw rate [rad/s]",
+         {"gyro", "visual: similarity fit", "visual: log-polar maps"}}}},
+      {{"wall"},
+       {{"measured", &contact}, {"exact", &exact_contact}},
+       {{"time_to_contact",
+         "Time to contact in each approach, until it brakes",
+         "true frames to impact",
+         "time to contact [frames]",
+         {"measured", "exact"}}}},
       {{"corridor", "corridor-empty", "bee"},
        {{"path", &path}, {"gross (flow balance)", &balance_wish}, {"fine (obstacles)", &obstacle_wish}},
        {{"path", "Ways through the corridor, from above", "along [m]", "across [m]", {"path"}},
-        {"heading", "Heading wishes of the gross and the fine process", "time [s]", "yaw rate [rad/s]", {"gross (flow balance)", "fine (obstacles)"}}}},
-      {{"arena"}, {{"height", &height_over_time}},
+        {"heading",
+         "Heading wishes of the gross and the fine process",
+         "time [s]",
+         "yaw rate [rad/s]",
+         {"gross (flow balance)", "fine (obstacles)"}}}},
+      {{"arena"},
+       {{"height", &height_over_time}},
        {{"height", "Height after the edge has moved", "time since lift-off [s]", "height [m]", {"height"}}}},
       {{"city-max", "city-near", "city-defocus"},
        {{"height", &height_over_way}, {"setpoint", &setpoint_over_way}, {"roofs and ground below", &skyline}},
-       {{"single", "One flight over the boxes below it", "along [m]", "height [m]", {"height", "setpoint", "roofs and ground below"}, true},
+       {{"single",
+         "One flight over the boxes below it",
+         "along [m]",
+         "height [m]",
+         {"height", "setpoint", "roofs and ground below"},
+         true},
         {"height", "Height along the way, all flights", "along [m]", "height [m]", {"height"}}}},
       {{"hover", "edge-height", "landing", "all"},
-       {{"truth", &height_over_time}, {"setpoint", &setpoint_over_time}, {"from the ground plane", &ground_height_cue}, {"from edges", &edge_height_cue}},
-       {{"height", "Height", "time since lift-off [s]", "height [m]", {"truth", "setpoint", "from the ground plane", "from edges"}}}},
+       {{"truth", &height_over_time},
+        {"setpoint", &setpoint_over_time},
+        {"from the ground plane", &ground_height_cue},
+        {"from edges", &edge_height_cue}},
+       {{"height",
+         "Height",
+         "time since lift-off [s]",
+         "height [m]",
+         {"truth", "setpoint", "from the ground plane", "from edges"}}}},
   };
   return kSets;
 }
@@ -162,7 +196,8 @@ void RunFigures::add(std::uint32_t seed, const FlightTrace& trace, const WorldPr
   const FigureSet* set = set_of(mission_);
   if (set == nullptr || flights_.size() >= kMostFlights) return;
   Flight flight{seed, {}};
-  for (const CurveKind& c : set->curves) flight.series.emplace_back(c.name, tools::thin_envelope(c.take(trace, probe), kSlices));
+  for (const CurveKind& c : set->curves)
+    flight.series.emplace_back(c.name, tools::thin_envelope(c.take(trace, probe), kSlices));
   const auto after = std::upper_bound(flights_.begin(), flights_.end(), seed,
                                       [](std::uint32_t s, const Flight& f) { return s < f.seed; });
   flights_.insert(after, std::move(flight));

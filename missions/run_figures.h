@@ -13,7 +13,7 @@
 namespace wasp::missions {
 
 struct Figure {
-  std::string file;   ///< stem of its SVG
+  std::string file;  ///< stem of its SVG
   std::string title;
   tools::Plot plot;
 };

@@ -15,8 +15,8 @@ class WorldProbe {
   explicit WorldProbe(const MissionSetup& setup);
   ~WorldProbe();
 
-  /// Where the vehicle is in the world's own frame, in which a corridor runs north along y = 0; the flight's frame begins
-  /// at the start [m].
+  /// Where the vehicle is in the world's own frame, in which a corridor runs north along y = 0; the flight's frame
+  /// begins at the start [m].
   [[nodiscard]] Vec3 in_world(const Truth& truth) const;
 
   /// What is around the vehicle's centre (sim/clearance.h), people and all as they were then.

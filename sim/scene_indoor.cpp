@@ -59,7 +59,8 @@ class Builder {
   /// The same with the start up to 0.4 m to one side and 10 degrees askew, from the seed.
   Scene finish_astray(const char* title, std::uint32_t seed) {
     Random random(mix(seed, 61));
-    const auto side = static_cast<float>(random.uniform(-0.4, 0.4)), askew = static_cast<float>(random.uniform(-10, 10));
+    const auto side = static_cast<float>(random.uniform(-0.4, 0.4)),
+               askew = static_cast<float>(random.uniform(-10, 10));
     return {std::move(world_), Vec3(0, side, 0), askew * kPi / 180, title};
   }
 

@@ -1,8 +1,9 @@
 // Worlds as VRML97 files: what the generators make, any VRML viewer shows and the renderer flies in. Written: one Shape
 // for each texture (a PNG beside the file) with the light baked into the faces' colours. Read: any VRML97 file, through
 // Coin; what was baked is taken as it is, other faces are lit by the renderer's own lamp. The first Viewpoint is the
-// start. Moving parts are Transforms routed from interpolators and a TimeSensor, which starts when the viewer enters; for
-// the simulator time is counted from the vehicle's leaving the ground. VRML's axes are x right, y up, -z ahead; north is ahead, so NED (n, e, d) is VRML (e, -d, -n).
+// start. Moving parts are Transforms routed from interpolators and a TimeSensor, which starts when the viewer enters;
+// for the simulator time is counted from the vehicle's leaving the ground. VRML's axes are x right, y up, -z ahead;
+// north is ahead, so NED (n, e, d) is VRML (e, -d, -n).
 #pragma once
 
 #include <filesystem>

@@ -36,10 +36,9 @@ class Line {
 
 constexpr std::array<std::string_view, 5> kModes = {"disarmed", "hold", "behaviour", "manual", "failsafe"};
 constexpr std::array<std::string_view, 16> kReasons = {
-    "none",          "start",          "mission_step",    "cue_lost",       "cue_back",
-    "attitude_lost", "attitude_back",  "link_lost",       "link_back",      "pilot",
-    "not_finite",    "autopilot_left", "deadline_missed", "stop_requested", "landed",
-    "too_old"};
+    "none",      "start",     "mission_step", "cue_lost",   "cue_back",       "attitude_lost",   "attitude_back",
+    "link_lost", "link_back", "pilot",        "not_finite", "autopilot_left", "deadline_missed", "stop_requested",
+    "landed",    "too_old"};
 static_assert(static_cast<std::size_t>(ModeReason::kTooOld) + 1 == kReasons.size());
 static_assert(static_cast<std::size_t>(FlightMode::kFailsafe) + 1 == kModes.size());
 
@@ -59,17 +58,21 @@ std::string_view cue_columns() {
          "index,"
          "over_budget,attitude_valid,q_w,q_x,q_y,q_z,rate_x_body_radps,rate_y_body_radps,rate_z_body_radps,"
          "validity,has_height,has_heading_rate,has_pitch,avoid,quality,height_m,height_sigma_m,heading_rate_radps,"
-         "pitch_rad,has_velocity,has_climb,velocity_forward_mps,velocity_right_mps,velocity_sigma_mps,climb_mps,climb_1ps,"
-         "accel_valid,accel_x_body_mps2,accel_y_body_mps2,accel_z_body_mps2,detail_0,detail_1,detail_2,detail_3,detail_4,detail_5,detail_6,detail_7,number,published_at_ns";
+         "pitch_rad,has_velocity,has_climb,velocity_forward_mps,velocity_right_mps,velocity_sigma_mps,climb_mps,climb_"
+         "1ps,"
+         "accel_valid,accel_x_body_mps2,accel_y_body_mps2,accel_z_body_mps2,detail_0,detail_1,detail_2,detail_3,detail_"
+         "4,detail_5,detail_6,detail_7,number,published_at_ns";
 }
 std::string_view command_columns() {
   return "exposed_at_ns,due_at_ns,released_at_ns,computed_at_ns,written_at_ns,tick,q_w,q_x,q_y,q_z,yaw_rate_radps,"
-         "thrust,height_setpoint_m,height_m,climb_rate_mps,cue_source,mode,reason,sent,mission_phase,velocity_forward_mps,velocity_right_mps,avoid,velocity_held,mode_name,"
+         "thrust,height_setpoint_m,height_m,climb_rate_mps,cue_source,mode,reason,sent,mission_phase,velocity_forward_"
+         "mps,velocity_right_mps,avoid,velocity_held,mode_name,"
          "reason_name,number,published_at_ns";
 }
 std::string_view truth_columns() {
   return "exposed_at_ns,position_north_m,position_east_m,position_down_m,velocity_north_mps,velocity_east_mps,"
-         "velocity_down_mps,q_w,q_x,q_y,q_z,rate_x_body_radps,rate_y_body_radps,rate_z_body_radps,height_m,armed,flight_time_s,"
+         "velocity_down_mps,q_w,q_x,q_y,q_z,rate_x_body_radps,rate_y_body_radps,rate_z_body_radps,height_m,armed,"
+         "flight_time_s,"
          "number,published_at_ns";
 }
 

@@ -71,8 +71,8 @@ std::vector<Result> judged_by_mission(const Run& run) {
   return results;
 }
 
-/// What this mission must show beyond being flown to its end. One that was cut short, by an interrupt or by --seconds, is
-/// reported but not judged: nobody flies 60 m in ten seconds.
+/// What this mission must show beyond being flown to its end. One that was cut short, by an interrupt or by --seconds,
+/// is reported but not judged: nobody flies 60 m in ten seconds.
 std::vector<Result> mission_results(const Run& run, const std::vector<Phase>& phases, bool cut_short) {
   if (!run.options.replay.empty()) return {};
   if (run.options.mission == "hover") return hover_results(run.folder / "log", phases);

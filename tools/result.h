@@ -23,10 +23,12 @@ inline nlohmann::json to_json(const Result& r) {
 
 /// Back from to_json; a value that is no number is NaN.
 inline Result result_from_json(const nlohmann::json& j) {
-  const auto text = [&](const char* key) { return j.contains(key) && j[key].is_string() ? j[key].get<std::string>() : ""; };
+  const auto text = [&](const char* key) {
+    return j.contains(key) && j[key].is_string() ? j[key].get<std::string>() : "";
+  };
   const auto& value = j.contains("value") ? j["value"] : nlohmann::json();
-  return {text("name"), value.is_number() ? value.get<double>() : std::numeric_limits<double>::quiet_NaN(), text("unit"),
-          text("bar"), j.value("ok", false)};
+  return {text("name"), value.is_number() ? value.get<double>() : std::numeric_limits<double>::quiet_NaN(),
+          text("unit"), text("bar"), j.value("ok", false)};
 }
 
 /// `value` against an upper bar.

@@ -52,7 +52,8 @@ concept Behaviour = requires(const typename B::Params& params, const BehaviourIn
   noexcept->std::same_as<CueBody>;
 };
 
-/// A behaviour that also makes flow fields for others: `flow` gives the field of the last step, nullptr if it made none.
+/// A behaviour that also makes flow fields for others: `flow` gives the field of the last step, nullptr if it made
+/// none.
 template <class B>
 concept FlowSource = Behaviour<B> && requires(const typename B::State& state) {
   { B::kPublishes } -> std::convertible_to<Stream>;

@@ -43,7 +43,7 @@ struct FlowMessage {
   std::array<float, 9> R_second_first{1, 0, 0, 0, 1, 0, 0, 0, 1};
   std::array<float, 4> q_ned_body{1, 0, 0, 0};  ///< attitude at the second frame, level when unknown
   FlowField seen;                               ///< as seen
-  FlowField still;  ///< without the camera's own turn; equal to `seen` when that is unknown
+  FlowField still;                              ///< without the camera's own turn; equal to `seen` when that is unknown
   /// Depth along the optical axis at each cell's centre in the first frame [m]; 0: unknown.
   std::array<float, FlowField::kMaxColumns * FlowField::kMaxRows> depth_m{};
 

@@ -122,8 +122,8 @@ float spacing_of(const Intrinsics& k, const FlowField& field) noexcept {
   return static_cast<float>(k.width_px) / k.fx_px / static_cast<float>(field.columns);
 }
 
-PathChoice find_path(const Params& p, const LevelFlow& flow, std::span<const MapReading> readings,
-                     float spacing_rad, float speed_mps, State& s) noexcept {
+PathChoice find_path(const Params& p, const LevelFlow& flow, std::span<const MapReading> readings, float spacing_rad,
+                     float speed_mps, State& s) noexcept {
   observe(p.map, readings, spacing_rad, speed_mps, s.map);
   PathChoice path;
   if (speed_mps >= p.least_speed_mps)

@@ -38,8 +38,8 @@ struct Flight {
       correct(filter, seen.front().second, seen.front().first, now_ns, estimate);
       seen.pop_front();
     }
-    const Tilt t =
-        velocity_hold_step(hold, forward_mps, known(filter, estimate, now_ns), estimate.velocity_mps, yaw_rate_radps, kDt_s, state);
+    const Tilt t = velocity_hold_step(hold, forward_mps, known(filter, estimate, now_ns), estimate.velocity_mps,
+                                      yaw_rate_radps, kDt_s, state);
     constexpr float kLag = kDt_s / 0.2f;  // the attitude follows in 0.2 s
     tilt_accel.forward += kLag * (-9.81f * std::tan(t.pitch_rad) - tilt_accel.forward);
     tilt_accel.right += kLag * (9.81f * std::tan(t.roll_rad) - tilt_accel.right);

@@ -27,7 +27,8 @@ LockstepOptions options(std::uint32_t seed, float seconds) {
   vision::GroundAltitude::Params ground;
   vision::EdgeAltitude::Params edge;
   ground.camera = edge.camera = o.sim.camera;
-  o.behaviours = {lockstep_behaviour<vision::GroundAltitude>(0, ground), lockstep_behaviour<vision::EdgeAltitude>(1, edge)};
+  o.behaviours = {lockstep_behaviour<vision::GroundAltitude>(0, ground),
+                  lockstep_behaviour<vision::EdgeAltitude>(1, edge)};
   return o;
 }
 

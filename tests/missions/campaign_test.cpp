@@ -1,5 +1,5 @@
-// Each mission, flown a few times in lockstep, meets its bars: the short form of `wasp reproduce`. Virtual time: no host
-// is too slow for it.
+// Each mission, flown a few times in lockstep, meets its bars: the short form of `wasp reproduce`. Virtual time: no
+// host is too slow for it.
 #include "missions/campaign.h"
 
 #include <gtest/gtest.h>
@@ -34,11 +34,12 @@ TEST_P(Campaign, MeetsItsBars) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Missions, Campaign,
-                         ::testing::Values(Short{"turntable", 1, 501}, Short{"hover-yaw", 1, 501}, Short{"aggressive", 1, 501},
-                                           Short{"wall", 3, 501}, Short{"corridor-empty", 2, 501}, Short{"corridor", 2, 501}, Short{"bee", 1, 501},
-                                           Short{"arena", 2, 501}, Short{"city-max", 1, 501}, Short{"city-near", 2, 501},
-                                           Short{"city-defocus", 1, 501}, Short{"edge-height", 1, 501},
-                                           Short{"landing", 1, 501}),
+                         ::testing::Values(Short{"turntable", 1, 501}, Short{"hover-yaw", 1, 501},
+                                           Short{"aggressive", 1, 501}, Short{"wall", 3, 501},
+                                           Short{"corridor-empty", 2, 501}, Short{"corridor", 2, 501},
+                                           Short{"bee", 1, 501}, Short{"arena", 2, 501}, Short{"city-max", 1, 501},
+                                           Short{"city-near", 2, 501}, Short{"city-defocus", 1, 501},
+                                           Short{"edge-height", 1, 501}, Short{"landing", 1, 501}),
                          [](const auto& row) {
                            std::string name = row.param.mission;
                            for (char& c : name) c = c == '-' ? '_' : c;
@@ -80,7 +81,8 @@ TEST(CampaignRuns, AnUnknownMissionListsTheKnownOnes) {
     FAIL();
   } catch (const std::exception& e) {
     EXPECT_NE(std::string(e.what()).find("unknown mission 'moon'"), std::string::npos);
-    for (const auto& name : tools::mission_names()) EXPECT_NE(std::string(e.what()).find(name), std::string::npos) << name;
+    for (const auto& name : tools::mission_names())
+      EXPECT_NE(std::string(e.what()).find(name), std::string::npos) << name;
   }
 }
 
@@ -107,7 +109,8 @@ TEST(CampaignRuns, ReadersOfFlowWithoutASourceAreRefusedByName) {
 /// The corridor's bars can fail: without the behaviours that steer, a start askew ends at a wall or swings wide.
 TEST(CampaignRuns, WithoutSteeringTheCorridorsBarsAreMissed) {
   const auto file = std::filesystem::temp_directory_path() / ("no-steer-" + std::to_string(getpid()) + ".toml");
-  std::ofstream(file) << "[behaviour.flow_balance]\nheading_weight = 0.0\n[behaviour.obstacle_depth]\nheading_weight = 0.0\n";
+  std::ofstream(file)
+      << "[behaviour.flow_balance]\nheading_weight = 0.0\n[behaviour.obstacle_depth]\nheading_weight = 0.0\n";
   CampaignOptions options{"corridor-empty", 1, 501, 1, {file.string()}};
   EXPECT_FALSE(fly_campaign(options, {}).passed());
   std::filesystem::remove(file);

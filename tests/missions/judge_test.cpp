@@ -120,7 +120,8 @@ FlightTrace yawing(double scale, double noise) {
     c.body.validity = Validity::kValid;
     random = random * 1664525u + 1013904223u;
     const double n = noise * (static_cast<double>(random >> 8) / (1 << 23) - 1);
-    c.body.detail[vision::HeadingDetail::kYawRate_radps] = static_cast<float>(scale * 0.5 * std::sin(0.01 * (i - 3)) + n);
+    c.body.detail[vision::HeadingDetail::kYawRate_radps] =
+        static_cast<float>(scale * 0.5 * std::sin(0.01 * (i - 3)) + n);
     trace.cues["heading_rate"].push_back(c);
   }
   return trace;

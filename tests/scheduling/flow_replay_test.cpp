@@ -302,7 +302,8 @@ class FlowReplay : public ::testing::Test {
 
 TEST_F(FlowReplay, GivesTheSameCuesToTheBitThoughTheReaderIsSlowerThanTheCamera) {
   Steps live = fly();
-  for (int i = 0; i < 5 && live.frames_lost > 0; ++i) live = fly();  // a frame torn by a stalled host is in no recording
+  for (int i = 0; i < 5 && live.frames_lost > 0; ++i)
+    live = fly();  // a frame torn by a stalled host is in no recording
   ASSERT_GT(live.field.size(), 10u);
   ASSERT_GT(live.reader.size(), 4u);
   int with_depth = 0, without_depth = 0, with_vehicle = 0;

@@ -146,11 +146,13 @@ TEST_F(StarvationTest, ABehaviourThatSpinsForEverCannotStarveControl) {
     EXPECT_EQ(state_, static_cast<std::uint32_t>(BehaviourState::kDemoted));
     EXPECT_NE(log_.find("demoted to SCHED_OTHER"), std::string::npos) << log_;
     if (skipped_ + missed_ == 0) return;
-    // Until the spinner is demoted the kernel's fair server may take the core for threads it starved, control's with it,
-    // and the more of them a busy machine runs the likelier; a control thread that is starved loses ticks every time.
+    // Until the spinner is demoted the kernel's fair server may take the core for threads it starved, control's with
+    // it, and the more of them a busy machine runs the likelier; a control thread that is starved loses ticks every
+    // time.
     on_a_quiet_host = on_a_quiet_host || quiet_host;
   }
-  if (on_a_quiet_host) FAIL() << "ticks lost in every attempt; in the last " << skipped_ << " skipped, " << missed_ << " missed";
+  if (on_a_quiet_host)
+    FAIL() << "ticks lost in every attempt; in the last " << skipped_ << " skipped, " << missed_ << " missed";
   GTEST_SKIP() << "the host stood still in every attempt: nothing can be said of missed ticks";
 }
 

@@ -19,13 +19,13 @@ namespace wasp::vision::test {
 /// A box that stands on the floor; people are boxes that walk along the corridor and turn round at its ends.
 struct Box {
   float x_m = 0, y_m = 0, half_x_m = 0.2f, half_y_m = 0.2f, tall_m = 2.f;
-  float walk_mps = 0;             ///< towards -x when negative; 0: stands
-  float from_m = 0, to_m = 0;     ///< the stretch walked to and fro
+  float walk_mps = 0;          ///< towards -x when negative; 0: stands
+  float from_m = 0, to_m = 0;  ///< the stretch walked to and fro
 };
 
 struct Corridor {
   float width_m = 2.5f, length_m = 24.f, ceiling_m = 2.6f;
-  bool open = false;       ///< no walls, floor only
+  bool open = false;                          ///< no walls, floor only
   float blank_left = 0.f, blank_right = 0.f;  ///< share of a wall's cells that have no texture
   std::vector<Box> boxes;
 };
@@ -42,7 +42,7 @@ struct FlightParams {
   float depth_noise = 1.42e-3f, depth_dropout = 0.05f;  ///< sigma over z^2
   float least_depth_m = 0.4f, greatest_depth_m = 7.f;
   bool depth = true, derotated = true;
-  float gust_mps2 = 0.15f;   ///< standard deviation of sideways acceleration, correlated over a second
+  float gust_mps2 = 0.15f;  ///< standard deviation of sideways acceleration, correlated over a second
   float half_width_m = 0.3f;
 };
 
@@ -113,7 +113,8 @@ class CorridorFlight {
   template <class Wish>
   FlightLog fly(float seconds, Wish wish) {
     FlightLog log;
-    const auto frame_ticks = static_cast<long>(kTick_hz / p_.rate_hz), control_ticks = static_cast<long>(kTick_hz / p_.control_hz);
+    const auto frame_ticks = static_cast<long>(kTick_hz / p_.rate_hz),
+               control_ticks = static_cast<long>(kTick_hz / p_.control_hz);
     while (time_s() < seconds) {
       if (tick_ % frame_ticks == 0) {
         take_frame();
@@ -146,8 +147,8 @@ class CorridorFlight {
   };
   struct Hit {
     float range_m = 1e6f;
-    int box = -1;      ///< index, or -1: corridor
-    int wall = 0;      ///< -1 left, 1 right, 0 other
+    int box = -1;  ///< index, or -1: corridor
+    int wall = 0;  ///< -1 left, 1 right, 0 other
   };
 
   float uniform() { return std::uniform_real_distribution<float>(0.f, 1.f)(random_); }
@@ -173,7 +174,8 @@ class CorridorFlight {
     }
     for (std::size_t i = 0; i < world_.boxes.size(); ++i) {
       const Box& b = world_.boxes[i];
-      const Vec3 low(b.x_m - b.half_x_m, b.y_m - b.half_y_m, -b.tall_m), high(b.x_m + b.half_x_m, b.y_m + b.half_y_m, 0.f);
+      const Vec3 low(b.x_m - b.half_x_m, b.y_m - b.half_y_m, -b.tall_m),
+          high(b.x_m + b.half_x_m, b.y_m + b.half_y_m, 0.f);
       float in = 1e-3f, out = hit.range_m;
       for (int axis = 0; axis < 3; ++axis) {
         const float inverse = 1.f / (std::abs(d[axis]) < 1e-9f ? 1e-9f : d[axis]);
@@ -242,7 +244,8 @@ class CorridorFlight {
     for (int r = 0; r < p_.rows; ++r)
       for (int c = 0; c < p_.columns; ++c) fill_cell(c, r, R_world_cam);
     const float dt_s = message_.interval_s();
-    const Vec3 error = Vec3(normal(), normal(), normal()) * p_.gyro_noise_radps * dt_s + Vec3(bias_radps_, bias_radps_, bias_radps_) * dt_s;
+    const Vec3 error = Vec3(normal(), normal(), normal()) * p_.gyro_noise_radps * dt_s +
+                       Vec3(bias_radps_, bias_radps_, bias_radps_) * dt_s;
     Mat3 R = R_world_cam.transpose() * last_R_;
     if (error.norm() > 0.f) R = Eigen::AngleAxisf(error.norm(), error.normalized()).toRotationMatrix() * R;
     message_.still = message_.seen;
@@ -266,7 +269,9 @@ class CorridorFlight {
     const float z_m = s.depth_m + p_.depth_noise * s.depth_m * s.depth_m * normal();
     if (p_.depth && uniform() >= p_.depth_dropout && z_m >= p_.least_depth_m && z_m <= p_.greatest_depth_m)
       message_.depth_m[k] = z_m;
-    if (uniform() < p_.dropout || s.blank || !pixel_of(geometry_.lens(), R_world_cam.transpose() * (point - camera_position()), to)) return;
+    if (uniform() < p_.dropout || s.blank ||
+        !pixel_of(geometry_.lens(), R_world_cam.transpose() * (point - camera_position()), to))
+      return;
     cell.u_px = to.u_px - at.u_px + p_.flow_noise_px * normal();
     cell.v_px = to.v_px - at.v_px + p_.flow_noise_px * normal();
     if (uniform() < p_.wild) cell.u_px += 8.f * normal(), cell.v_px += 8.f * normal();
@@ -275,7 +280,8 @@ class CorridorFlight {
 
   void control() {
     std::optional<SteeringWish> newest;
-    while (!waiting_.empty() && waiting_.front().from_s <= time_s()) newest = waiting_.front().wish, waiting_.erase(waiting_.begin());
+    while (!waiting_.empty() && waiting_.front().from_s <= time_s())
+      newest = waiting_.front().wish, waiting_.erase(waiting_.begin());
     if (newest) command_ = *newest;
     const float wanted = std::clamp(command_.heading_rate_radps, -0.8f, 0.8f);
     sent_radps_ += std::clamp(wanted - sent_radps_, -4.f / p_.control_hz, 4.f / p_.control_hz);
@@ -285,8 +291,8 @@ class CorridorFlight {
     constexpr float kGravity = 9.81f;
     now_.yaw_rate_radps += (sent_radps_ - now_.yaw_rate_radps) * dt_s / p_.yaw_lag_s;
     gust_mps2_ += -gust_mps2_ * dt_s + p_.gust_mps2 * std::sqrt(2.f * dt_s) * normal();
-    const float ahead = std::clamp((p_.speed_mps - now_.forward_mps()) / p_.speed_lag_s, -2.f, 2.f) -
-                        kGravity * command_.pitch_rad;
+    const float ahead =
+        std::clamp((p_.speed_mps - now_.forward_mps()) / p_.speed_lag_s, -2.f, 2.f) - kGravity * command_.pitch_rad;
     const float right = std::clamp(-now_.right_mps() / p_.drift_lag_s, -2.f, 2.f);
     const float c = std::cos(now_.heading_rad), s = std::sin(now_.heading_rad);
     now_.vx_mps += (ahead * c - right * s) * dt_s;
@@ -314,7 +320,8 @@ class CorridorFlight {
     if (!world_.open) least = std::min(least, world_.length_m - now_.x_m);
     for (const Box& b : world_.boxes) {
       if (b.tall_m < now_.height_m - 0.15f) continue;
-      const float dx = std::max(0.f, std::abs(now_.x_m - b.x_m) - b.half_x_m), dy = std::max(0.f, std::abs(now_.y_m - b.y_m) - b.half_y_m);
+      const float dx = std::max(0.f, std::abs(now_.x_m - b.x_m) - b.half_x_m),
+                  dy = std::max(0.f, std::abs(now_.y_m - b.y_m) - b.half_y_m);
       least = std::min(least, std::hypot(dx, dy));
     }
     return least - p_.half_width_m;
@@ -357,14 +364,16 @@ inline Corridor busy_corridor(unsigned seed) {
   for (float x = 4.f; x < c.length_m - 4.f; x += between(3.f, 5.f)) {
     if (between(0.f, 1.f) < 0.7f) side = -side;
     const float reach = between(0.35f, c.width_m - 1.3f), half_x = between(0.15f, 0.35f), tall = between(0.6f, 2.2f);
-    const bool walked = (x > free_from[0] - 1.5f && x < free_from[0] + 7.5f) || (x > free_from[1] - 1.5f && x < free_from[1] + 7.5f);
+    const bool walked =
+        (x > free_from[0] - 1.5f && x < free_from[0] + 7.5f) || (x > free_from[1] - 1.5f && x < free_from[1] + 7.5f);
     if (!walked) c.boxes.push_back({x, side * 0.5f * (c.width_m - reach), half_x, 0.5f * reach, tall});
   }
   for (const float from : free_from) {
     const float half_y = between(0.2f, 0.27f), side_p = between(0.f, 1.f) < 0.5f ? -1.f : 1.f;
     const float gap = between(1.2f, c.width_m - 2.f * half_y - 0.05f);  // free on the other side
     const float y = side_p * (gap + half_y - 0.5f * c.width_m);
-    c.boxes.push_back({between(from + 2.f, from + 6.f), y, 0.15f, half_y, 1.75f, -between(0.3f, 0.8f), from, from + 6.f});
+    c.boxes.push_back(
+        {between(from + 2.f, from + 6.f), y, 0.15f, half_y, 1.75f, -between(0.3f, 0.8f), from, from + 6.f});
   }
   return c;
 }

@@ -138,7 +138,8 @@ FlowMessage ventral(float height_m, float speed_mps, int frame) {
 
 CueBody over_ground(float height_m, float speed_mps) {
   Landing::Params params;
-  params.camera.intrinsics = {.width_px = 320, .height_px = 240, .fx_px = 160, .fy_px = 160, .cx_px = 159.5f, .cy_px = 119.5f};
+  params.camera.intrinsics = {
+      .width_px = 320, .height_px = 240, .fx_px = 160, .fy_px = 160, .cx_px = 159.5f, .cy_px = 119.5f};
   params.camera.R_body_cam = R_body_cam_from_pitch_down(Radians{1.5707963});
   Landing::State state;
   CueBody cue;
@@ -177,7 +178,8 @@ TYPED_TEST(Steering, BlindInputGivesNoWishAndNoCrash) {
     in.flow = m;
     if (m != nullptr) in.exposed_at_ns = m->exposed_at_ns;
     const CueBody cue = TypeParam::step(params, in, state);
-    return cue.validity == Validity::kBlind || (cue.has_heading_rate == 0 && cue.has_pitch == 0 && cue.has_climb == 0) ||
+    return cue.validity == Validity::kBlind ||
+           (cue.has_heading_rate == 0 && cue.has_pitch == 0 && cue.has_climb == 0) ||
            (cue.heading_rate_radps == 0.f && cue.pitch_rad == 0.f);
   };
   EXPECT_TRUE(silent(nullptr));

@@ -20,9 +20,9 @@ struct FlowMotionParams {
   float depth_sigma = 0.01f;        ///< of the depth: this share of it ...
   float depth_sigma_1pm = 0.0015f;  ///< ... and this times its square [1/m]
   float min_depth_m = 0.3f, max_depth_m = 8.f;
-  float inlier_sigmas = 10.f;      ///< of the expected error, beyond which a cell does not follow the motion
+  float inlier_sigmas = 10.f;     ///< of the expected error, beyond which a cell does not follow the motion
   float turn_sigma_rad = 0.002f;  ///< prior of what is left of the turn, each axis; 0: nothing is
-  int min_inliers = 10;            ///< >= 4
+  int min_inliers = 10;           ///< >= 4
   float min_inlier_share = 0.5f;
 };
 

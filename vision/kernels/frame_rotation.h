@@ -13,7 +13,8 @@ namespace wasp::vision {
 /// Attitudes are w x y z, body to NED, of about unit length. Realtime-safe: yes.
 inline Mat3 frame_rotation(const Mat3& R_body_cam, const std::array<float, 4>& first_ned_body,
                            const std::array<float, 4>& second_ned_body) WASP_REALTIME {
-  const auto quat = [](const std::array<float, 4>& q) WASP_REALTIME { return Quat(q[0], q[1], q[2], q[3]).normalized(); };
+  const auto quat = [](const std::array<float, 4>& q)
+                        WASP_REALTIME { return Quat(q[0], q[1], q[2], q[3]).normalized(); };
   const Quat turn_second_first = quat(second_ned_body).conjugate() * quat(first_ned_body);
   return R_body_cam.transpose() * turn_second_first.toRotationMatrix() * R_body_cam;
 }

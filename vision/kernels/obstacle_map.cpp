@@ -88,7 +88,8 @@ int map_readings(const MapParams& params, const LevelFlow& flow, std::span<const
     const float slope = cell.first.z() / std::max(1e-3f, std::hypot(cell.first.x(), cell.first.y()));
     const float leaves_m = (slope > 0.f ? params.below_m : params.above_m) / std::max(1e-3f, std::abs(slope));
     r.through_m = std::min(r.range_m, leaves_m);
-    if (cell.moved && cell.depth_m > 0.f) r.closing_mps = closing_speed(cell, range_m[k], flow.interval_s, r.closing_weight);
+    if (cell.moved && cell.depth_m > 0.f)
+      r.closing_mps = closing_speed(cell, range_m[k], flow.interval_s, r.closing_weight);
     out[n++] = r;
   }
   return static_cast<int>(n);

@@ -39,7 +39,7 @@ struct MapParams {
 struct MapReading {
   float azimuth_rad = 0, x_m = 0, y_m = 0, range_m = 0;  ///< range: horizontal
   float closing_mps = 0, closing_weight = 0;             ///< speed towards the vehicle along the heading, if weight > 0
-  float through_m = 0;  ///< horizontal range up to which the cell's ray runs within the band and meets nothing
+  float through_m = 0;   ///< horizontal range up to which the cell's ray runs within the band and meets nothing
   bool in_band = false;  ///< false: the cell sees something above or below the way, or far off
 };
 
