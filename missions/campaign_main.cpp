@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "missions/campaign.h"
+#include "missions/progress_line.h"
 #include "missions/run_figures.h"
 
 namespace {
@@ -76,14 +77,8 @@ int run(const Options& o) {
     return 0;
   }
   if (!o.out.empty()) fs::create_directories(o.out);
-  const bool terminal = isatty(STDERR_FILENO) != 0;
-  double printed_s = -10;
-  const auto progress = [&](const CampaignProgress& p) {
-    if (!terminal && p.done < p.runs && p.elapsed_s - printed_s < 10) return;
-    printed_s = p.elapsed_s;
-    std::cerr << (terminal ? "\r\033[K" : "") << progress_text(p) << (terminal && p.done < p.runs ? "" : "\n")
-              << std::flush;
-  };
+  ProgressLine line(o.campaign.mission);
+  const auto progress = [&](const CampaignProgress& p) { line.show(progress_text(p), p.done == p.runs); };
   RunFigures figures(o.campaign.mission);
   const CampaignResult result =
       fly_campaign(o.campaign, progress, [&](std::uint32_t seed, const FlightTrace& trace, const WorldProbe& probe) {

@@ -9,6 +9,7 @@
 #include <iostream>
 #include <stdexcept>
 
+#include "missions/progress_line.h"
 #include "missions/reproduce.h"
 #include "rt/process.h"
 #include "tools/edge_study.h"
@@ -46,22 +47,6 @@ std::optional<int> parse(int argc, char** argv, Options& o) {
   }
   return std::nullopt;
 }
-
-/// One line that is rewritten on a terminal, or printed now and then.
-class ProgressLine {
- public:
-  explicit ProgressLine(std::string title) : title_(std::move(title)) {}
-  void show(const std::string& text, bool last) {
-    if (terminal_)
-      std::cerr << "\r\033[K" << title_ << ": " << text << (last ? "\n" : "") << std::flush;
-    else if (last)
-      std::cerr << title_ << ": " << text << "\n";
-  }
-
- private:
-  std::string title_;
-  bool terminal_ = isatty(STDERR_FILENO) != 0;
-};
 
 ExperimentResult fly_experiment(const Experiment& e, const Options& o) {
   ExperimentResult result;
