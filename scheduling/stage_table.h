@@ -91,6 +91,16 @@ struct RunStatus {
   std::atomic<std::uint64_t> setpoints_flushed{0};    ///< times an old setpoint was thrown out of a stalled line
   std::atomic<std::uint64_t> behaviour_ticks{0};      ///< control ticks commanded by behaviours
   std::array<std::atomic<std::uint32_t>, 24> behaviour_state{};  ///< BehaviourState by Cue::behaviour index
+  std::atomic<std::uint32_t> faults_armed{0};                    ///< 1: fault points exist in this flight (--faults)
+  std::atomic<std::uint32_t> incarnation{0};       ///< 0: first flying process of this flight, n: started again n times
+  std::atomic<std::uint64_t> frames_duplicate{0};  ///< the same image, or the same sequence or exposure, once more
+  std::atomic<std::uint64_t> frames_stuck{0};      ///< of those, the ones after which the camera counts as frozen
+  std::atomic<std::uint64_t> frames_disordered{0};  ///< older than one already used
+  std::atomic<std::uint64_t> frames_malformed{0};   ///< of another size or format than the camera promised
+  std::atomic<std::uint64_t> frames_misdated{0};    ///< exposed in the future, or too old to be of use
+  std::atomic<std::uint64_t> samples_refused{0};    ///< of the autopilot: not finite, implausible, frozen
+  std::atomic<std::uint64_t> schedule_thefts{0};    ///< times a thread was found with another policy, priority or core
+  std::atomic<std::uint64_t> pages_lost{0};         ///< of shared memory whose file was cut short
 };
 
 }  // namespace wasp::scheduling
