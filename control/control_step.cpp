@@ -39,6 +39,7 @@ Situation assess(const ControlParams& p, const ControlInput& in, bool height_see
       !now.ground_seen && s.ground_seen_at_ns != kNever && in.now_ns - s.ground_seen_at_ns > p.ground_hold_limit_ns;
   now.setpoint_finite = finite;
   now.deadlines_missed = in.deadlines_missed;
+  now.only_watching = s.mission.phase == MissionPhase::kWatch;
   return now;
 }
 
@@ -213,7 +214,8 @@ void put_setpoint(const ControlParams& p, const ControlInput& in, const Setpoint
   c.thrust = s.sent.thrust;
   c.mode = s.mode.mode;
   c.reason = s.mode.reason;
-  const bool not_ours = in.autopilot.heard_at_ns == kNever || s.mission.phase == MissionPhase::kBroken;
+  const bool not_ours = in.autopilot.heard_at_ns == kNever || s.mission.phase == MissionPhase::kBroken ||
+                        s.mission.phase == MissionPhase::kWatch;
   const bool stopped = s.mode.mode == FlightMode::kFailsafe && p.failsafe_action == FailsafeAction::kStopStream;
   c.sent = !not_ours && !stopped;
 }
@@ -281,6 +283,7 @@ ControlOutput control_step(const ControlParams& p, const ControlInput& in, Contr
   c.mission_phase = static_cast<std::uint8_t>(s.mission.phase);
   out.ask_arm = wish.armed && !(in.autopilot.armed && in.autopilot.follows) && s.mission.phase == MissionPhase::kArm;
   out.ask_disarm = wish.disarm && in.autopilot.armed;
+  if (wish.rotors) out.neutral_thrust = p.failsafe_thrust_share * hover_thrust(p.altitude_hold, 1.f);
   return out;
 }
 

@@ -79,6 +79,7 @@ struct ControlState {
 struct ControlOutput {
   Command command;
   bool ask_arm = false, ask_disarm = false;
+  float neutral_thrust = 0;  ///< what whoever must speak in our place sends, level: a gentle descent; 0 on the ground
   TimeNs cue_until_ns = kForever;       ///< a cue it rests on reaches its age limit
   TimeNs attitude_until_ns = kForever;  ///< the attitude it rests on does
 };

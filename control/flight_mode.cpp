@@ -14,6 +14,7 @@ struct Row {
 constexpr std::array kRows = {
     Row{[](const Situation& s) WASP_REALTIME { return !s.autopilot_armed; }, FlightMode::kDisarmed,
         ModeReason::kMissionStep},
+    Row{[](const Situation& s) WASP_REALTIME { return s.only_watching; }, FlightMode::kManual, ModeReason::kRestarted},
     Row{[](const Situation& s) WASP_REALTIME { return !s.link_alive; }, FlightMode::kFailsafe, ModeReason::kLinkLost},
     Row{[](const Situation& s) WASP_REALTIME { return !s.autopilot_follows; }, FlightMode::kManual,
         ModeReason::kAutopilotLeft},
@@ -63,7 +64,8 @@ const char* name_of(ModeReason reason) noexcept {
                                  "deadlines missed",
                                  "stop requested",
                                  "landed",
-                                 "too old at the wire"};
+                                 "too old at the wire",
+                                 "started again: watching only"};
   const auto i = static_cast<std::size_t>(reason);
   return i < kNames.size() ? kNames[i] : "unknown";
 }

@@ -17,6 +17,7 @@ struct Situation {
   bool ground_lost_long = false;  ///< none was for longer than the hold limit
   bool setpoint_finite = true;
   bool deadlines_missed = false;  ///< two consecutive ticks
+  bool only_watching = false;     ///< a flying process started again: it sends nothing
 };
 
 struct ModeState {

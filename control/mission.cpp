@@ -54,6 +54,17 @@ MissionWish wait_and_arm(const MissionParams& p, const MissionInput& in, Mission
   return wish;
 }
 
+/// Started again in flight: whatever the vehicle does now, the autopilot does it. Over once it is disarmed for a
+/// second.
+MissionWish watch(const MissionParams& p, const MissionInput& in, MissionState& s, double in_phase_s) noexcept {
+  if (!in.heard || in.armed) s.settled_since_ns = kNever;
+  if (in.heard && !in.armed && s.settled_since_ns == kNever) s.settled_since_ns = in.now_ns;
+  const bool disarmed = s.settled_since_ns != kNever && in.now_ns - s.settled_since_ns >= kSecond;
+  const bool unheard = !in.heard && in_phase_s > static_cast<double>(p.patience_s);
+  if (disarmed || unheard || in.stop_requested) end_early(s, MissionPhase::kBroken, EarlyEnd::kRestarted, in.now_ns);
+  return {};
+}
+
 /// The sticks of a leg `t_s` after its start. They rest for the first second, so that a leg starts from hover.
 void move_sticks(const HoverLeg& leg, double t_s, MissionWish& wish) noexcept {
   const auto wave = [t_s](float amplitude, float period_s) noexcept {
@@ -98,7 +109,7 @@ MissionWish fly_leg(const MissionParams& p, const MissionInput& in, MissionState
 }  // namespace
 
 MissionWish mission_step(const MissionParams& p, const MissionInput& in, MissionState& s) noexcept {
-  if (s.since_ns == kNever) s.since_ns = in.now_ns;
+  if (s.since_ns == kNever) enter(s, p.never_command ? MissionPhase::kWatch : s.phase, in.now_ns);
   const double in_phase_s = to_seconds(in.now_ns - s.since_ns);
   MissionWish wish;
   switch (s.phase) {
@@ -125,6 +136,8 @@ MissionWish mission_step(const MissionParams& p, const MissionInput& in, Mission
     case MissionPhase::kDone:
     case MissionPhase::kBroken:
       return wish;
+    case MissionPhase::kWatch:
+      return watch(p, in, s, in_phase_s);
     default:
       return fly_leg(p, in, s, in_phase_s);
   }
@@ -144,6 +157,8 @@ const char* name_of(MissionPhase phase) noexcept {
       return "done";
     case MissionPhase::kBroken:
       return "broken off";
+    case MissionPhase::kWatch:
+      return "watching only: started again in flight";
     default:
       return "hover";
   }
@@ -156,7 +171,8 @@ const char* name_of(EarlyEnd end) noexcept {
                                  "the ground was not seen or the autopilot did not arm in time",
                                  "disarmed in flight",
                                  "no ground found while landing",
-                                 "the autopilot did not disarm"};
+                                 "the autopilot did not disarm",
+                                 "the flying process was started again in flight and only watches"};
   const auto i = static_cast<std::size_t>(end);
   return i < kNames.size() ? kNames[i] : "unknown";
 }

@@ -24,6 +24,7 @@ struct MissionParams {
   static constexpr int kMaxLegs = 8;
   int leg_count = 0;
   std::array<HoverLeg, kMaxLegs> legs{};
+  bool never_command = false;     ///< started again in flight: watch until the vehicle is disarmed, send nothing
   bool follow_recording = false;  ///< replay: arm, hold the height the recording shows, no take-off or landing
   float recording_seconds = 0.f;  ///< replay: length of the run
   float landed_margin_m = 0.06f;  ///< this close to the standing height counts as standing
@@ -37,7 +38,8 @@ enum class MissionPhase : std::uint8_t {
   kLand = 20,
   kDisarm = 21,
   kDone = 22,
-  kBroken = 23
+  kBroken = 23,
+  kWatch = 24  ///< nothing is sent
 };
 
 struct MissionInput {
@@ -57,6 +59,7 @@ enum class EarlyEnd : std::uint8_t {
   kDisarmed,      ///< disarmed in flight
   kNoGround,      ///< the landing took too long
   kNotDisarming,  ///< the autopilot did not disarm
+  kRestarted,     ///< the flying process died and was started again: it never commands
 };
 
 struct MissionState {

@@ -17,6 +17,7 @@
 #include <system_error>
 #include <utility>
 
+#include "drivers/line_handover.h"
 #include "rt/clock.h"
 
 namespace wasp::drivers {
@@ -111,8 +112,15 @@ SerialPort::SerialPort(SerialEndpoint endpoint) : endpoint_(std::move(endpoint))
   fd_ = device;
 }
 
+SerialPort::SerialPort(SerialEndpoint endpoint, LineGift gift)
+    : endpoint_(std::move(endpoint)), socket_fd_(gift.socket_fd), nothing_fd_(::open("/", O_PATH | O_CLOEXEC)) {
+  fd_ = gift.line_fd;
+  for (const int fd : {fd_, socket_fd_}) fcntl(fd, F_SETFD, FD_CLOEXEC);
+}
+
 SerialPort::~SerialPort() {
   ::close(fd_);
+  if (socket_fd_ >= 0) ::close(socket_fd_);
   if (nothing_fd_ >= 0) ::close(nothing_fd_);
 }
 
@@ -130,11 +138,19 @@ int SerialPort::open_device() noexcept {
   return -1;
 }
 
+/// The device, from where this port has it.
+int SerialPort::obtain_device() noexcept {
+  if (socket_fd_ < 0) return open_device();
+  const int device = take_descriptor(socket_fd_);
+  last_error_ = device < 0 ? ENODEV : 0;
+  return device;
+}
+
 void SerialPort::release() noexcept { dup3(nothing_fd_, fd_, O_CLOEXEC); }
 
 bool SerialPort::try_reopen() noexcept {
   release();
-  const int device = open_device();
+  const int device = obtain_device();
   if (device < 0) return false;
   const bool swapped = dup3(device, fd_, O_CLOEXEC) == fd_;
   ::close(device);

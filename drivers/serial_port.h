@@ -35,10 +35,18 @@ struct IoResult {
   std::size_t bytes = 0;  ///< moved; for a write it may be fewer than offered
 };
 
+/// A line that another process (the guardian) has opened and set up.
+struct LineGift {
+  int line_fd = -1;    ///< the port's own from here on; may be dead already
+  int socket_fd = -1;  ///< where a line opened again comes from (line_handover.h); the port's own as well
+};
+
 class SerialPort {
  public:
   /// Opens, takes exclusive use and sets up the line. Throws std::runtime_error naming the device and the reason.
   explicit SerialPort(SerialEndpoint endpoint);
+  /// Uses a line opened by another process, which also opens it again after a loss.
+  SerialPort(SerialEndpoint endpoint, LineGift gift);
   ~SerialPort();
   SerialPort(const SerialPort&) = delete;
   SerialPort& operator=(const SerialPort&) = delete;
@@ -59,8 +67,8 @@ class SerialPort {
     return written_total_.load(std::memory_order_relaxed);
   }
 
-  /// Lets the device go, so that it can come back under the same name, and looks for it once. False while it is absent
-  /// or refused; `last_error` says why. One thread only. Realtime-safe: no (open).
+  /// Lets the device go, so that it can come back under the same name, and looks for it once: opens it, or asks who
+  /// gave it. False while it is absent or refused; `last_error` says why. One thread only. Realtime-safe: no (open).
   bool try_reopen() noexcept;
   /// Lets the device go; reads and writes return kGone until try_reopen succeeds.
   void release() noexcept;
@@ -71,8 +79,10 @@ class SerialPort {
 
  private:
   int open_device() noexcept;
+  int obtain_device() noexcept;
 
   SerialEndpoint endpoint_;
+  int socket_fd_ = -1;   ///< of a gift; -1: the port opens the device itself
   int nothing_fd_ = -1;  ///< refuses reads and writes; stands in while the device is away
   int fd_ = -1;
   int last_error_ = 0;

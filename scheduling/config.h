@@ -7,6 +7,7 @@
 #include "control/control_step.h"
 #include "rt/periodic.h"
 #include "rt/thread.h"
+#include "scheduling/guard_config.h"
 #include "scheduling/toml_table.h"
 #include "types/camera.h"
 
@@ -61,6 +62,8 @@ struct Config {
   DurationNs control_period_ns = 50 * kMillisecond;
   DurationNs control_deadline_ns = 10 * kMillisecond;
   control::ControlParams control;
+
+  GuardConfig guardian;  ///< checked here, obeyed by `wasp guard`
 
   ThreadRow control_thread{"control", 1, 80, 2 * kMillisecond};
   ThreadRow link_thread{"link", 1, 70, 1 * kMillisecond};

@@ -4,6 +4,7 @@
 
 #include "rt/clock.h"
 #include "shm/topics.h"
+#include "types/frames.h"
 
 namespace wasp::scheduling {
 namespace {
@@ -41,6 +42,7 @@ void ControlLoop::run(LoopControl& control) {
   rt::PeriodicGrid grid(rt::now() + config_.control_period_ns, config_.control_period_ns,
                         config_.control_thread.overrun);
   while (loop.tick() && !mission_over_.load(std::memory_order_relaxed)) tick(rt::wait_next(grid), control);
+  last_beat();
 }
 
 void ControlLoop::tick(const rt::Release& release, LoopControl& control) WASP_REALTIME {
@@ -62,6 +64,7 @@ void ControlLoop::tick(const rt::Release& release, LoopControl& control) WASP_RE
   commands_.write(command, rt::now());
   announce(command);
   end_of_tick(input, control);
+  beat(input, output);
 }
 
 /// What a release itself says: how late, and whether others were passed over.
@@ -90,6 +93,34 @@ void ControlLoop::end_of_tick(const control::ControlInput& input, LoopControl& c
     mission_over_.store(true);
   }
   status.armed.store(input.autopilot.armed ? 1 : 0, std::memory_order_relaxed);
+}
+
+/// False while the guardian speaks in our place: two voices at once would be none.
+bool ControlLoop::line_is_ours() const WASP_REALTIME {
+  return wiring_.guard == nullptr ||
+         wiring_.guard->owner.load(std::memory_order_acquire) == static_cast<std::uint32_t>(LineOwner::kFlight);
+}
+
+/// Tells the guardian that control lives, until when it will, and what would be neutral meanwhile.
+void ControlLoop::beat(const control::ControlInput& input, const control::ControlOutput& output) WASP_REALTIME {
+  if (wiring_.guard == nullptr) return;
+  GuardBlock& guard = *wiring_.guard;
+  const Command& command = output.command;
+  const auto& q = input.attitude.q_ned_body;
+  if (input.attitude_present)
+    guard.yaw_rad.store(euler_from_quat(Quat(q[0], q[1], q[2], q[3])).yaw_rad, std::memory_order_relaxed);
+  guard.neutral_thrust.store(output.neutral_thrust, std::memory_order_relaxed);
+  guard.commanding.store(command.sent != 0 && input.autopilot.armed ? 1 : 0, std::memory_order_relaxed);
+  guard.tick.store(command.tick, std::memory_order_relaxed);
+  guard.next_due_ns.store(command.due_at_ns + config_.control_period_ns, std::memory_order_relaxed);
+  guard.beat_at_ns.store(rt::now(), std::memory_order_release);
+}
+
+/// Control ends in order: nothing hangs on it any more.
+void ControlLoop::last_beat() noexcept {
+  if (wiring_.guard == nullptr) return;
+  wiring_.guard->commanding.store(0);
+  wiring_.guard->next_due_ns.store(0);
 }
 
 void ControlLoop::gather(control::ControlInput& input) WASP_REALTIME {
@@ -152,7 +183,7 @@ void ControlLoop::send(const control::ControlInput& input, control::ControlOutpu
   used = refuse_if_too_old(input, output, used, control);
   const std::size_t setpoint_bytes = used;
   used = append_requests(output, used, command.computed_at_ns);
-  if (used == 0) return;
+  if (used == 0 || !line_is_ours()) return;
   const SetpointLine::Sent sent = line_.send(std::span<const std::uint8_t>(out_.data(), used), setpoint_bytes);
   if (sent.flushed) control.status->setpoints_flushed.fetch_add(1, std::memory_order_relaxed);
   if (command.sent != 0 && sent.setpoint_whole) command.written_at_ns = rt::now();

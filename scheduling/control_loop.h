@@ -13,6 +13,7 @@
 #include "rt/seqlock.h"
 #include "scheduling/config.h"
 #include "scheduling/events.h"
+#include "scheduling/guard_block.h"
 #include "scheduling/realtime_loop.h"
 #include "scheduling/setpoint_line.h"
 #include "shm/broadcast_ring.h"
@@ -41,6 +42,7 @@ struct ControlWiring {
   EventQueue* events = nullptr;
   ThreadWatch* watch = nullptr;                            ///< required
   std::vector<const ThreadWatch*> behaviour_watches = {};  ///< by Cue::behaviour, nullptr: not enabled; may be empty
+  GuardBlock* guard = nullptr;                             ///< null without a guardian
   ControlHook hook = {};
 };
 
@@ -74,6 +76,9 @@ class ControlLoop {
   void account_cues(const control::ControlInput& input, const Command& command, RunStatus& status) WASP_REALTIME;
   void report_miss(const Command& command, std::uint64_t skipped, bool missed) WASP_REALTIME;
   void end_of_tick(const control::ControlInput& input, LoopControl& control) WASP_REALTIME;
+  [[nodiscard]] bool line_is_ours() const WASP_REALTIME;
+  void beat(const control::ControlInput& input, const control::ControlOutput& output) WASP_REALTIME;
+  void last_beat() noexcept;
   void announce(const Command& command) WASP_REALTIME;
 
   Config config_;

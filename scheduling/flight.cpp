@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <memory>
+#include <optional>
 
 #include "drivers/recording.h"
 #include "rt/clock.h"
@@ -15,6 +16,7 @@
 #include "scheduling/flight_end.h"
 #include "scheduling/flight_options.h"
 #include "scheduling/flight_regions.h"
+#include "scheduling/guard_page.h"
 #include "scheduling/link_loop.h"
 #include "scheduling/replay_camera.h"
 #include "scheduling/supervisor.h"
@@ -66,6 +68,17 @@ struct ThreadBody {
   std::function<void(LoopControl&)> run;
 };
 
+std::optional<GuardPage> adopt_guard(const FlightOptions& options) {
+  return options.guarded ? std::optional(GuardPage::adopt(kPageDescriptor)) : std::nullopt;
+}
+
+/// The serial line: the guardian's, or opened here.
+drivers::SerialPort open_line(const FlightOptions& options, const Config& config) {
+  const auto endpoint = drivers::SerialEndpoint::parse(config.endpoint);
+  return options.guarded ? drivers::SerialPort(endpoint, {kLineDescriptor, kLineSocketDescriptor})
+                         : drivers::SerialPort(endpoint);
+}
+
 /// Everything one flight owns, in order of construction; destroyed in reverse, threads first.
 class Flight {
  public:
@@ -74,14 +87,17 @@ class Flight {
         options_(options),
         config_(std::move(config)),
         real_time_(!options.no_rt),
-        flight_(create_flight_region(options.instance, rings_of(table, config_), real_time_)),
+        guard_(adopt_guard(options)),
+        flight_(create_flight_region(options.instance, rings_of(table, config_), real_time_, incarnation() > 0)),
         flight_files_{flight_.name()},
         stages_(stage_table(flight_)),
-        port_(drivers::SerialEndpoint::parse(config_.endpoint)),
+        port_(open_line(options, config_)),
         autopilot_(identity_of(config_)) {
     control_.status = &run_status(flight_);
     control_.status->preempt_rt = rt::kernel_is_preempt_rt() ? 1 : 0;
+    control_.status->incarnation = incarnation();
     control_.strict_syscalls = config_.strict_syscalls;
+    config_.control.mission.never_command = incarnation() > 0;
     frame_period_ns_ = from_seconds(1.0 / config_.camera_rate_hz);
   }
 
@@ -99,12 +115,16 @@ class Flight {
     control_.realtime_started = true;
     flight_files_.keep = camera_files_.keep = true;  // the recorder drains them; the launcher removes them
     log(real_time_ ? "armed for real time" : "running, NOT REAL TIME");
+    if (incarnation() > 0) log("started again by the guardian: watching, never commanding");
     supervise(signals);
     control_.status->finished = 1;
     return conclude_flight({*control_.status, control_.overrun_stop, recording_problems_ > 0, replay_.get()}, log);
   }
 
  private:
+  /// Flying processes before this one on the same line.
+  [[nodiscard]] std::uint32_t incarnation() const { return guard_ ? guard_->block().incarnation.load() : 0; }
+
   void open_camera() {
     if (options_.replay.empty()) {
       if (config_.camera_driver == "replay")
@@ -170,6 +190,7 @@ class Flight {
     link_ = std::make_unique<LinkLoop>(flight_, port_, autopilot_, stages_, report_, link_events_,
                                        add_watch(config_.link_thread));
     control.watch = &add_watch(config_.control_thread);
+    control.guard = guard_ ? &guard_->block() : nullptr;
     control_loop_ = std::make_unique<ControlLoop>(config_, control);
     supervisor_ = std::make_unique<Supervisor>(board_, *control_.status, supervisor_options(), log);
   }
@@ -254,6 +275,7 @@ class Flight {
   FlightOptions options_;
   Config config_;
   bool real_time_;
+  std::optional<GuardPage> guard_;  ///< of a guarded flight
   shm::Region flight_;
   RegionFiles flight_files_, camera_files_;  // a flight that never began leaves nothing behind
   StageTable& stages_;

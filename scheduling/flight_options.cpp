@@ -6,7 +6,8 @@ namespace wasp::scheduling {
 
 std::optional<int> parse_flight_options(int argc, char** argv, FlightOptions& o) {
   CLI::App app{
-      "The flying process alone; `wasp fly` starts it together with simulator, recorder and report.\n"
+      "The flying process; `wasp fly` starts it together with simulator, recorder and report. `wasp guard`, with the\n"
+      "same options, starts it under a guardian that keeps the serial line and answers for it when it dies or hangs.\n"
       "Exit code 0: the mission was flown to its end and behaviours commanded it; 1: broken off, refused or an error;\n"
       "2: bad arguments; 3: --check-rights found some missing; 4: it ended in order, but short of its purpose "
       "(stopped\n"
@@ -23,6 +24,8 @@ std::optional<int> parse_flight_options(int argc, char** argv, FlightOptions& o)
                  "admission by this log/stages.json of an earlier flight, not by configured budgets")
       ->check(CLI::ExistingFile);
   app.add_flag("--no-rt", o.no_rt, "ordinary scheduling, no locked memory; every figure is marked 'not real time'");
+  app.add_flag("--guarded", o.guarded,
+               "started by `wasp guard`: the serial line is inherited, and the control thread beats");
   app.add_flag("--check-rights", o.check_rights, "only say which rights real time lacks; exit code 3 if any");
   try {
     app.parse(argc, argv);

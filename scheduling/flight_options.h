@@ -16,6 +16,7 @@ struct FlightOptions {
   std::string measured;
   bool no_rt = false;
   bool check_rights = false;
+  bool guarded = false;  ///< started by a guardian: page and line are inherited (guard_page.h)
 };
 
 /// An exit code when the program is to end at once (help, bad arguments).

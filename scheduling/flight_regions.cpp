@@ -20,7 +20,8 @@ std::byte* block(const shm::Region& region, const char* topic, const char* type)
 
 }  // namespace
 
-shm::Region create_flight_region(const std::string& instance, const BehaviourRings& behaviours, bool real_time) {
+shm::Region create_flight_region(const std::string& instance, const BehaviourRings& behaviours, bool real_time,
+                                 bool keep_history) {
   std::vector<shm::TopicSpec> specs{
       {shm::kImu, "Imu", TopicKind::kRing, shm::kImuSlots, sizeof(ImuSample)},
       {shm::kAttitude, "Attitude", TopicKind::kRing, shm::kAttitudeSlots, sizeof(AttitudeSample)},
@@ -35,6 +36,10 @@ shm::Region create_flight_region(const std::string& instance, const BehaviourRin
     if (!silent(name)) specs.push_back({shm::cue_topic(name), "Cue", TopicKind::kRing, shm::kCueSlots, sizeof(Cue)});
   shm::Region region =
       shm::Region::create(shm::flight_region(instance), specs, real_time ? "real time" : "NOT REAL TIME");
+  if (keep_history) {  // the flight goes on: what was counted stays
+    run_status(region).finished = run_status(region).mission_result = 0;
+    return region;
+  }
   new (block(region, shm::kStages, "StageTable")) StageTable;
   auto* status = new (block(region, "run", "RunStatus")) RunStatus;
   status->real_time = real_time ? 1 : 0;

@@ -18,8 +18,10 @@ struct BehaviourRings {
 };
 
 /// Creates wasp.<instance>.flight with imu, attitude, command, one cue topic per enabled behaviour, flow fields, stages
-/// and run. A region left by a crashed flight is taken over with its history; its counters start anew.
-shm::Region create_flight_region(const std::string& instance, const BehaviourRings& behaviours, bool real_time);
+/// and run. A region left by a crashed flight is taken over with its history; its counters start anew, or go on with
+/// `keep_history`, for a flying process started again.
+shm::Region create_flight_region(const std::string& instance, const BehaviourRings& behaviours, bool real_time,
+                                 bool keep_history = false);
 
 StageTable& stage_table(const shm::Region& flight);
 RunStatus& run_status(const shm::Region& flight);

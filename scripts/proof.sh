@@ -16,10 +16,10 @@ sanitize() {
 # and flew its mission: deadlines missed on a busy host are not the sanitizer's business.
 fly_under_realtime_sanitizer() {
   local folder=$here/build-rtsan/flight
-  build wasp-fly wasp-sim wasp-record wasp-report || return
+  build wasp-guard wasp-fly wasp-sim wasp-record wasp-report || return
   mkdir -p "$folder"
   ln -sfn "$here/config" "$here/build-rtsan/config"
-  cp "$here/build-rtsan/wasp" "$here"/build/wasp-{fly,sim,record,report} "$folder/"
+  cp "$here/build-rtsan/wasp" "$here"/build/wasp-{guard,fly,sim,record,report} "$folder/"
   "$folder/wasp-fly" --no-rt --seconds 20 --out "$here/build-rtsan/out" | tee "$folder/fly.log" || true
   grep -q '^ok *flight process exit code' "$folder/fly.log" && grep -q '^ok *mission flown' "$folder/fly.log"
 }

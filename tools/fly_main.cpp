@@ -49,7 +49,7 @@ int watch(const Run& run, ChildProcess& flight, ChildProcess& sim) {
       ++passed_on;  // one step a look: the first is always "land"
       std::cerr << (passed_on == 1 ? "\ninterrupted: landing in order (once more: stop at once)\n"
                                    : "\nstopping at once\n");
-      flight.signal(passed_on <= 2 ? SIGINT : SIGKILL);  // the second stops it by its own way
+      flight.signal(passed_on <= 2 ? SIGINT : SIGQUIT);  // the second stops it by its own way, the third kills it
     }
     if (const auto code = sim.poll()) {
       std::cerr << fmt::format("\nthe simulator ended with code {}\n", *code);

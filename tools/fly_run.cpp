@@ -151,7 +151,7 @@ void check_rights(Run& run) {
 }
 
 std::vector<std::string> flight_arguments(const Run& run) {
-  std::vector<std::string> a{program("wasp"), "flight", "--instance", run.instance};
+  std::vector<std::string> a{program("wasp-guard"), "--instance", run.instance};
   for (const auto& file : configuration_files(run)) a.insert(a.end(), {"--config", file});
   a.insert(a.end(), {"--config", (run.folder / "override.toml").string()});
   if (!run.real_time) a.push_back("--no-rt");

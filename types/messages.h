@@ -109,6 +109,7 @@ enum class ModeReason : std::uint8_t {
   kStopRequested,
   kLanded,
   kTooOld,
+  kRestarted,
 };
 
 /// One control tick: what was commanded and how long it took.

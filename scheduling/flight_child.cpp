@@ -1,0 +1,76 @@
+#include "scheduling/flight_child.h"
+
+#include <fcntl.h>
+#include <sys/prctl.h>
+#include <sys/syscall.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <csignal>
+#include <cstring>
+#include <stdexcept>
+
+#include "scheduling/guard_page.h"
+
+namespace wasp::scheduling {
+namespace {
+
+constexpr int kLastInherited = kLineSocketDescriptor;
+
+/// Puts the descriptors where a guarded flight looks for them. Above the targets first: they may be among them.
+bool inherit(const FlightChild::Descriptors& d) {
+  const std::array<int, 3> from{d.page, d.line, d.line_socket};
+  std::array<int, 3> safe{};
+  for (std::size_t i = 0; i < from.size(); ++i) safe[i] = fcntl(from[i], F_DUPFD_CLOEXEC, kLastInherited + 1);
+  bool ok = true;
+  for (std::size_t i = 0; i < safe.size(); ++i)
+    ok = dup2(safe[i], kPageDescriptor + static_cast<int>(i)) >= 0 && ok;  // dup2 clears close-on-exec
+  return ok;
+}
+
+}  // namespace
+
+FlightChild::FlightChild(const std::vector<std::string>& command, const Descriptors& descriptors,
+                         const cpu_set_t& cores) {
+  std::vector<char*> argv;
+  for (const auto& word : command) argv.push_back(const_cast<char*>(word.c_str()));
+  argv.push_back(nullptr);
+  const pid_t parent = getpid();
+  pid_ = fork();
+  if (pid_ < 0) throw std::runtime_error("fork for '" + command[0] + "': " + std::strerror(errno));
+  if (pid_ == 0) {
+    prctl(PR_SET_PDEATHSIG, SIGTERM);
+    if (getppid() != parent) _exit(126);
+    sigset_t none;
+    sigemptyset(&none);
+    sigprocmask(SIG_SETMASK, &none, nullptr);
+    sched_setaffinity(0, sizeof cores, &cores);
+    if (inherit(descriptors)) execv(argv[0], argv.data());
+    _exit(127);
+  }
+  pid_fd_ = static_cast<int>(syscall(SYS_pidfd_open, pid_, 0));
+  if (pid_fd_ >= 0) fcntl(pid_fd_, F_SETFD, FD_CLOEXEC);
+}
+
+FlightChild::~FlightChild() {
+  if (!poll()) {
+    signal(SIGKILL);
+    waitpid(pid_, nullptr, 0);
+  }
+  if (pid_fd_ >= 0) close(pid_fd_);
+}
+
+void FlightChild::signal(int number) const noexcept {
+  if (!end_) kill(pid_, number);  // not reaped yet, so the number is still its own
+}
+
+const std::optional<ProcessEnd>& FlightChild::poll() noexcept {
+  int status = 0;
+  if (end_ || waitpid(pid_, &status, WNOHANG) != pid_) return end_;
+  end_ = WIFEXITED(status) ? ProcessEnd{WEXITSTATUS(status), 0} : ProcessEnd{0, WTERMSIG(status)};
+  return end_;
+}
+
+}  // namespace wasp::scheduling

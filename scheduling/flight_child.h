@@ -1,0 +1,45 @@
+// The flying process as its guardian holds it: started with the guard page and the serial line as inherited
+// descriptors, watched through a pidfd. It is told to land (SIGTERM) should the guardian die.
+#pragma once
+
+#include <sched.h>
+#include <sys/types.h>
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace wasp::scheduling {
+
+/// How a process ended.
+struct ProcessEnd {
+  int code = 0;    ///< exit code, if signal is 0
+  int signal = 0;  ///< that ended it
+};
+
+class FlightChild {
+ public:
+  /// What a guarded flight finds as descriptors 3, 4 and 5 (guard_page.h).
+  struct Descriptors {
+    int page = -1, line = -1, line_socket = -1;
+  };
+
+  /// Starts `command[0]` on the cores of `cores`, without the guardian's priority. Throws std::runtime_error.
+  FlightChild(const std::vector<std::string>& command, const Descriptors& descriptors, const cpu_set_t& cores);
+  ~FlightChild();  ///< kills it, if it still runs
+  FlightChild(const FlightChild&) = delete;
+  FlightChild& operator=(const FlightChild&) = delete;
+
+  [[nodiscard]] pid_t pid() const noexcept { return pid_; }
+  [[nodiscard]] int pid_fd() const noexcept { return pid_fd_; }  ///< readable once it has ended
+  void signal(int number) const noexcept;
+  /// Its end once it has come, without waiting.
+  const std::optional<ProcessEnd>& poll() noexcept;
+
+ private:
+  pid_t pid_ = -1;
+  int pid_fd_ = -1;
+  std::optional<ProcessEnd> end_;
+};
+
+}  // namespace wasp::scheduling
