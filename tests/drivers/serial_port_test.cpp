@@ -13,6 +13,7 @@
 #include <thread>
 #include <vector>
 
+#include "drivers/line_handover.h"
 #include "rt/clock.h"
 
 namespace wasp::drivers {
@@ -226,6 +227,53 @@ TEST(SerialPort, NoticesHangUpAndComesBackUnderTheSamePath) {
     EXPECT_EQ(port.read(buffer).bytes, 3u);
     EXPECT_EQ(port.write(std::span(buffer).first(3)).bytes, 3u);
   }
+}
+
+TEST(SerialPort, AGivenLineThatIsLostComesBackFromWhoGaveIt) {
+  FarEnd far(own_link());
+  SerialPort giver({far.path(), 115200});
+  const HandoverSockets sockets = make_handover();
+  SerialPort taker({far.path(), 115200}, {dup(giver.fd()), sockets.taker});
+  std::array<std::uint8_t, 8> buffer{};
+  EXPECT_EQ(taker.write(buffer).bytes, buffer.size());
+  for (int round = 0; round < 2; ++round) {
+    far.unplug();
+    ASSERT_TRUE(eventually([&] { return taker.read(buffer).status == IoStatus::kGone; }));
+    EXPECT_FALSE(taker.try_reopen());  // it never opens by itself
+    far.plug_in();
+    EXPECT_FALSE(taker.try_reopen());
+    ASSERT_TRUE(giver.try_reopen());
+    ASSERT_TRUE(give_descriptor(sockets.giver, giver.fd()));
+    ASSERT_TRUE(taker.try_reopen());
+    EXPECT_EQ(taker.write(buffer).bytes, buffer.size());
+    std::array<std::uint8_t, 8> heard{};
+    EXPECT_TRUE(eventually([&] { return ::read(far.fd(), heard.data(), heard.size()) > 0; }));
+  }
+  ::close(sockets.giver);
+}
+
+TEST(LineHandover, TheNewestOfSeveralIsTakenAndNoneIsLeaked) {
+  const HandoverSockets sockets = make_handover();
+  EXPECT_EQ(take_descriptor(sockets.taker), -1);
+  const int before = dup(0);
+  ::close(before);
+  const int first = ::open("/dev/null", O_RDONLY | O_CLOEXEC), second = ::open("/dev/zero", O_RDONLY | O_CLOEXEC);
+  ASSERT_TRUE(give_descriptor(sockets.giver, first));
+  ASSERT_TRUE(give_descriptor(sockets.giver, second));
+  ::close(first);
+  ::close(second);
+  const int taken = take_descriptor(sockets.taker);
+  ASSERT_GE(taken, 0);
+  char byte = 1;
+  EXPECT_EQ(::read(taken, &byte, 1), 1);  // /dev/zero, not /dev/null
+  EXPECT_EQ(byte, 0);
+  ::close(taken);
+  const int after = dup(0);
+  EXPECT_EQ(after, before);
+  ::close(after);
+  ::close(sockets.taker);
+  EXPECT_FALSE(give_descriptor(sockets.giver, 0));  // nobody takes any more: refused, not a signal
+  ::close(sockets.giver);
 }
 
 TEST(SerialPort, LetsTheDeviceGoOnRelease) {

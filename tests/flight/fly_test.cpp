@@ -381,6 +381,40 @@ TEST(Fly, AFloodOfGarbageIsSurvivedAndNeverArms) {
   shm::Region::remove(shm::flight_region(instance));
 }
 
+/// What befalls a flying process in the air.
+class FlightLost : public testing::TestWithParam<const char*> {};
+
+TEST_P(FlightLost, TheGuardianSpeaksStartsItAgainAndItNeverCommands) {
+  TemporaryFolder out;
+  const std::string name = unique("lost") + "-" + GetParam();
+  Program program({kWasp, "fly", "--no-rt", "--json", "--out", out.path.string(), "--name", name, "--seconds", "600"});
+  const fs::path log = out.path / name / "log";
+  ASSERT_TRUE(eventually([&] { return read_text(log / "commands.csv").find(",behaviour,") != std::string::npos; }));
+  run_shell(std::string("pkill -") + GetParam() + " -f -- 'wasp flight --instance " + name + " '");
+  EXPECT_NE(program.wait(), 0);
+  const std::string said = read_text(log / "flight.txt");
+  for (const char* line :
+       {"guardian: took the line", "guardian: flight process ended by signal", "guardian: flight process started again",
+        "watching only: started again in flight", "autopilot: landed: disarmed", "mission broken off"})
+    EXPECT_NE(said.find(line), std::string::npos) << line << "\n" << said;
+  // One log over both processes: ticks before and after, nothing sent after.
+  const auto commands = tools::CsvTable::read(log / "commands.csv");
+  ASSERT_TRUE(commands.has_value());
+  const std::size_t phase = *commands->column("mission_phase"), sent = *commands->column("sent");
+  std::size_t before = 0, after = 0;
+  for (std::size_t r = 0; r < commands->rows(); ++r) {
+    const bool watching = commands->text(r, phase) == "24";
+    ++(watching ? after : before);
+    EXPECT_TRUE(!watching || commands->text(r, sent) == "0") << "row " << r;
+  }
+  EXPECT_GT(before, 0u);
+  EXPECT_GT(after, 0u);
+  EXPECT_TRUE(fs::exists(out.path / name / "report.html"));
+  for (const auto& region : shm::Region::list("wasp." + name)) ADD_FAILURE() << "left behind: " << region;
+}
+
+INSTANTIATE_TEST_SUITE_P(ByASignal, FlightLost, testing::Values("KILL", "STOP", "SEGV"));
+
 TEST(Fly, TheSimulatorDyingIsSaidAndTheReportIsStillWritten) {
   TemporaryFolder out;
   const std::string name = unique("simdies");
