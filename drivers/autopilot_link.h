@@ -12,6 +12,7 @@
 
 #include "drivers/autopilot_samples.h"
 #include "drivers/clock_map.h"
+#include "drivers/companion_state.h"
 #include "messages/mavlink_frame.h"
 #include "rt/contract.h"
 #include "types/messages.h"
@@ -98,8 +99,8 @@ class AutopilotLink {
   /// `now_ns` becomes the autopilot's time once the clocks are matched.
   std::size_t encode_attitude_target(const AttitudeTargetCommand& target, TimeNs now_ns,
                                      std::span<std::uint8_t> out) WASP_REALTIME;
-  /// HEARTBEAT of an onboard controller; `state` is MAV_STATE. Due once a second.
-  std::size_t encode_heartbeat(std::uint8_t state, std::span<std::uint8_t> out) WASP_REALTIME;
+  /// HEARTBEAT of an onboard controller, saying of us what companion_state.h says.
+  std::size_t encode_heartbeat(const CompanionState& state, std::span<std::uint8_t> out) WASP_REALTIME;
   /// COMMAND_LONG to the autopilot; repeats carry `confirmation` + 1.
   std::size_t encode_command(std::uint16_t command, const std::array<float, 7>& parameters, std::uint8_t confirmation,
                              std::span<std::uint8_t> out) WASP_REALTIME;
