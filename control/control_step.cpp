@@ -16,15 +16,22 @@ Quat attitude_of(const ControlInput& in) noexcept {
   return Quat(q[0], q[1], q[2], q[3]);
 }
 
+/// There, and an attitude: a torn or overwritten sample is none.
+bool has_attitude(const ControlInput& in) noexcept {
+  if (!in.attitude_present) return false;
+  const float squared = attitude_of(in).squaredNorm();
+  return squared > 0.9f && squared < 1.1f;  // NaN fails both
+}
+
 /// Upward acceleration from specific force: level at rest gives 0.
 float accel_up(const ControlInput& in) noexcept {
-  if (!in.attitude_present || !in.accel_present) return 0.f;
+  if (!has_attitude(in) || !in.accel_present) return 0.f;
   const Vec3 force_ned = attitude_of(in) * Vec3(in.accel_body_mps2[0], in.accel_body_mps2[1], in.accel_body_mps2[2]);
   return -(force_ned.z() + kGravity_mps2);
 }
 
 float cos_tilt(const ControlInput& in) noexcept {
-  return in.attitude_present ? (attitude_of(in) * Vec3::UnitZ()).z() : 1.f;
+  return has_attitude(in) ? (attitude_of(in) * Vec3::UnitZ()).z() : 1.f;
 }
 
 Situation assess(const ControlParams& p, const ControlInput& in, bool height_seen, const ControlState& s,
@@ -33,7 +40,7 @@ Situation assess(const ControlParams& p, const ControlInput& in, bool height_see
   now.autopilot_armed = in.autopilot.armed;
   now.autopilot_follows = in.autopilot.follows;
   now.link_alive = in.autopilot.heard_at_ns != kNever && in.now_ns - in.autopilot.heard_at_ns <= p.link_age_limit_ns;
-  now.attitude_fresh = in.attitude_present && in.now_ns - in.attitude.exposed_at_ns <= p.attitude_age_limit_ns;
+  now.attitude_fresh = has_attitude(in) && in.now_ns - in.attitude.exposed_at_ns <= p.attitude_age_limit_ns;
   now.ground_seen = height_seen;
   now.ground_lost_long =
       !now.ground_seen && s.ground_seen_at_ns != kNever && in.now_ns - s.ground_seen_at_ns > p.ground_hold_limit_ns;
@@ -45,7 +52,7 @@ Situation assess(const ControlParams& p, const ControlInput& in, bool height_see
 
 /// Level specific force plus gravity: what the vehicle accelerates with, along the heading and to its right.
 LevelVelocity accel_level(const ControlInput& in) noexcept {
-  if (!in.attitude_present || !in.accel_present) return {};
+  if (!has_attitude(in) || !in.accel_present) return {};
   const Euler e = euler_from_quat(attitude_of(in));
   const Vec3 level = quat_from_euler({e.roll_rad, e.pitch_rad, 0.f}) *
                      Vec3(in.accel_body_mps2[0], in.accel_body_mps2[1], in.accel_body_mps2[2]);
@@ -54,7 +61,7 @@ LevelVelocity accel_level(const ControlInput& in) noexcept {
 
 void estimate_velocity(const ControlParams& p, const ControlInput& in, const Intention& intention,
                        ControlState& s) noexcept {
-  predict(p.velocity_filter, accel_level(in), in.attitude_present ? in.attitude.rate_body_radps[2] : 0.f, in.now_ns,
+  predict(p.velocity_filter, accel_level(in), has_attitude(in) ? in.attitude.rate_body_radps[2] : 0.f, in.now_ns,
           s.velocity);
   if (intention.velocity_source < 0) return;
   correct(p.velocity_filter, {intention.velocity_forward_mps, intention.velocity_right_mps},
@@ -110,7 +117,7 @@ float wanted_yaw_rate(const ControlParams& p, const ControlInput& in, const Inte
                       const MissionWish& wish, ControlState& s) noexcept {
   const float asked = (wish.steer ? intention.heading_rate_radps : 0.f) + wish.yaw_rate_radps;
   const bool steered = (wish.steer && intention.steered) || wish.yaw_rate_radps != 0.f;
-  if (!p.hold_heading || steered || !in.attitude_present) {
+  if (!p.hold_heading || steered || !has_attitude(in)) {
     s.holding_yaw = false;
     return asked;
   }
@@ -202,13 +209,15 @@ Setpoint by_mode(const ControlParams& p, const ControlInput& in, FlightMode mode
   return neutral;
 }
 
-/// Through the limits, from the last setpoint sent, into the command.
+/// Through the limits, from the last setpoint sent, into the command. Whatever is not the behaviours' own is level at
+/// once.
 void put_setpoint(const ControlParams& p, const ControlInput& in, const Setpoint& chosen, ControlState& s,
                   Command& c) noexcept {
   s.sent = s.sent_before;
+  if (s.mode.mode != FlightMode::kBehaviour) level(s.sent);
   if (!limit(p.limits, chosen, in.dt_s, s.sent)) s.sent = Setpoint{};  // cannot happen: neutral is finite
   const Quat q = quat_from_euler(
-      {s.sent.roll_rad, s.sent.pitch_rad, in.attitude_present ? euler_from_quat(attitude_of(in)).yaw_rad : 0.f});
+      {s.sent.roll_rad, s.sent.pitch_rad, has_attitude(in) ? euler_from_quat(attitude_of(in)).yaw_rad : 0.f});
   c.q_ned_body = {q.w(), q.x(), q.y(), q.z()};
   c.yaw_rate_radps = s.sent.yaw_rate_radps;
   c.thrust = s.sent.thrust;

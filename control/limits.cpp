@@ -25,4 +25,6 @@ bool limit(const LimitParams& p, const Setpoint& w, float dt_s, Setpoint& s) noe
   return true;
 }
 
+void level(Setpoint& s) noexcept { s = {.thrust = s.thrust}; }
+
 }  // namespace wasp::control

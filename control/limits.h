@@ -25,4 +25,8 @@ struct LimitParams {
 /// towards `wanted` within range and rate over `dt_s` > 0. Realtime-safe: yes.
 bool limit(const LimitParams& params, const Setpoint& wanted, float dt_s, Setpoint& setpoint) WASP_REALTIME;
 
+/// Level and not turning, at once: rates hold back what leads away from neutral, never the way to it. The thrust stays.
+/// Realtime-safe: yes.
+void level(Setpoint& setpoint) WASP_REALTIME;
+
 }  // namespace wasp::control

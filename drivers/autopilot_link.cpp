@@ -134,15 +134,6 @@ std::size_t AutopilotLink::encode_attitude_target(const AttitudeTargetCommand& t
   return encoder_.encode(m, out);
 }
 
-std::size_t AutopilotLink::encode_heartbeat(std::uint8_t state, std::span<std::uint8_t> out) WASP_REALTIME {
-  mavlink::Heartbeat m;
-  m.type = mavlink::mav_type::kOnboardController;
-  m.autopilot = mavlink::mav_autopilot::kInvalid;
-  m.system_status = state;
-  m.mavlink_version = 3;
-  return encoder_.encode(m, out);
-}
-
 std::size_t AutopilotLink::encode_heartbeat(const CompanionState& state, std::span<std::uint8_t> out) WASP_REALTIME {
   mavlink::Heartbeat m;
   m.type = mavlink::mav_type::kOnboardController;

@@ -99,9 +99,7 @@ class AutopilotLink {
   /// `now_ns` becomes the autopilot's time once the clocks are matched.
   std::size_t encode_attitude_target(const AttitudeTargetCommand& target, TimeNs now_ns,
                                      std::span<std::uint8_t> out) WASP_REALTIME;
-  /// HEARTBEAT of an onboard controller; `state` is MAV_STATE. Due once a second.
-  std::size_t encode_heartbeat(std::uint8_t state, std::span<std::uint8_t> out) WASP_REALTIME;
-  /// The same, with what wasp is doing: companion_state.h.
+  /// HEARTBEAT of an onboard controller, saying of us what companion_state.h says.
   std::size_t encode_heartbeat(const CompanionState& state, std::span<std::uint8_t> out) WASP_REALTIME;
   /// COMMAND_LONG to the autopilot; repeats carry `confirmation` + 1.
   std::size_t encode_command(std::uint16_t command, const std::array<float, 7>& parameters, std::uint8_t confirmation,

@@ -21,6 +21,7 @@ struct BehaviourWiring {
   std::uint32_t index = 0;  ///< Cue::behaviour
   DurationNs budget_ns = 0;
   bool frames_in_order = false;  ///< every frame in turn while the ring holds it; else the newest
+  FrameRules rules = {};         ///< what is held against its frames; nothing in a replay
   StageTable* stages = nullptr;
   ThreadWatch* watch = nullptr;             ///< required
   const BehaviourScript* script = nullptr;  ///< replay of a wasp recording: inputs as recorded, frames in order
@@ -36,7 +37,7 @@ class BehaviourLoop {
       : params_(params),
         state_(make_state<B>(params)),
         wiring_(wiring),
-        frames_(*wiring.camera, *wiring.flight, B::kStream),
+        frames_(*wiring.camera, *wiring.flight, B::kStream, wiring.rules),
         vehicle_(*wiring.flight),
         cues_(*wiring.flight, shm::cue_topic(std::string(B::kName)), "Cue"),
         wake_(wiring.stages->add(B::kName, "wake-up", 0)),
@@ -55,9 +56,25 @@ class BehaviourLoop {
  private:
   void cycle(LoopControl& control, bool in_order) WASP_REALTIME {
     if (const Frame frame = frames_.wait(rt::now() + 100 * kMillisecond, in_order)) serve(frame);
-    if (frames_.lost() == lost_reported_) return;
-    control.status->frames_lost.fetch_add(frames_.lost() - lost_reported_);
-    lost_reported_ = frames_.lost();
+    report_frames(*control.status);
+  }
+
+  /// What was lost or refused since the last call, for all behaviours together.
+  void report_frames(RunStatus& status) WASP_REALTIME {
+    const auto add = [](std::atomic<std::uint64_t>& word, std::uint64_t now, std::uint64_t& before) noexcept {
+      if (now != before) word.fetch_add(now - before, std::memory_order_relaxed);
+      before = now;
+    };
+    const FrameCounts& now = frames_.counts();
+    const auto refused = [&](FrameFault fault, std::atomic<std::uint64_t>& word) noexcept {
+      add(word, now.of(fault), reported_.refused[static_cast<std::size_t>(fault)]);
+    };
+    add(status.frames_lost, frames_.lost(), lost_reported_);
+    refused(FrameFault::kDuplicate, status.frames_duplicate);
+    refused(FrameFault::kDisordered, status.frames_disordered);
+    refused(FrameFault::kMalformed, status.frames_malformed);
+    refused(FrameFault::kMisdated, status.frames_misdated);
+    add(status.frames_stuck, now.frozen, reported_.frozen);
   }
 
   void serve(const Frame& frame) WASP_REALTIME {
@@ -155,6 +172,7 @@ class BehaviourLoop {
   Stage* compute_;
   std::uint32_t steps_ = 0;
   std::uint64_t lost_reported_ = 0;
+  FrameCounts reported_;
 };
 
 }  // namespace wasp::scheduling

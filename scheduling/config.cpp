@@ -91,6 +91,7 @@ void read_geometry(TomlTable& t, CameraGeometry& camera, double& pitch_down_deg)
 void read_camera(TomlTable t, Config& c) {
   t.text_value("driver", c.camera_driver, {"sim", "replay"});
   t.number("rate_hz", c.camera_rate_hz, 1, 1000);
+  t.number("stuck_frames", c.stuck_frames, 0, 1000);
   read_geometry(t, c.camera, c.camera_pitch_down_deg);
   t.finish();
 }

@@ -57,6 +57,7 @@ struct Config {
   CameraGeometry camera;
   double camera_pitch_down_deg = 30.0;
   double camera_rate_hz = 30.0;  ///< what admission takes as the period of the behaviours
+  int stuck_frames = 2;          ///< equal images in a row after which a camera counts as frozen; 0: not compared
   DownCameraConfig camera_down;
 
   DurationNs control_period_ns = 50 * kMillisecond;

@@ -182,22 +182,31 @@ void ControlLoop::send(const control::ControlInput& input, control::ControlOutpu
   if (wiring_.hook.before_write != nullptr) wiring_.hook.before_write(wiring_.hook.context, command.tick);
   used = refuse_if_too_old(input, output, used, control);
   const std::size_t setpoint_bytes = used;
+  used = append_heartbeat(command, control.status->incarnation.load(std::memory_order_relaxed), used);
   used = append_requests(output, used, command.computed_at_ns);
   if (used == 0 || !line_is_ours()) return;
   const SetpointLine::Sent sent = line_.send(std::span<const std::uint8_t>(out_.data(), used), setpoint_bytes);
   if (sent.flushed) control.status->setpoints_flushed.fetch_add(1, std::memory_order_relaxed);
+  if (!sent.setpoint_whole) heartbeat_due_ns_ = 0;  // it did not go out either
   if (command.sent != 0 && sent.setpoint_whole) command.written_at_ns = rt::now();
 }
 
-/// Heartbeat, TIMESYNC request, arming: behind the setpoint in the same write. Returns the bytes used.
+/// Once a second, and at once when what it says of us has changed: behind the setpoint in the same write. Returns the
+/// bytes used.
+std::size_t ControlLoop::append_heartbeat(const Command& command, std::uint32_t incarnation,
+                                          std::size_t used) WASP_REALTIME {
+  const drivers::CompanionState state{command.mode, command.reason, false, static_cast<std::uint8_t>(incarnation)};
+  if (command.computed_at_ns < heartbeat_due_ns_ && state == told_) return used;
+  told_ = state;
+  heartbeat_due_ns_ = command.computed_at_ns + kHeartbeatPeriod;
+  return used + wiring_.autopilot->encode_heartbeat(state, std::span<std::uint8_t>(out_).subspan(used));
+}
+
+/// Arming and disarming: behind the setpoint in the same write. Returns the bytes used.
 std::size_t ControlLoop::append_requests(const control::ControlOutput& output, std::size_t used,
                                          TimeNs now_ns) WASP_REALTIME {
   const auto rest = [&] { return std::span<std::uint8_t>(out_).subspan(used); };
   drivers::AutopilotLink& link = *wiring_.autopilot;
-  if (now_ns >= heartbeat_due_ns_) {
-    used += link.encode_heartbeat(mavlink::mav_state::kActive, rest());
-    heartbeat_due_ns_ = now_ns + kHeartbeatPeriod;
-  }
   if ((output.ask_arm || output.ask_disarm) && now_ns >= request_due_ns_) {
     if (output.ask_arm) used += link.encode_set_mode(static_cast<std::uint32_t>(config_.follow_mode), 0, 0, rest());
     used += link.encode_arm(output.ask_arm, 0, rest());

@@ -70,6 +70,7 @@ class ControlLoop {
   std::size_t refuse_if_too_old(const control::ControlInput& input, control::ControlOutput& output, std::size_t used,
                                 LoopControl& control) WASP_REALTIME;
   void send(const control::ControlInput& input, control::ControlOutput& output, LoopControl& control) WASP_REALTIME;
+  std::size_t append_heartbeat(const Command& command, std::uint32_t incarnation, std::size_t used) WASP_REALTIME;
   std::size_t append_requests(const control::ControlOutput& output, std::size_t used, TimeNs now_ns) WASP_REALTIME;
   void account(const control::ControlInput& input, const Command& command, std::uint64_t skipped,
                LoopControl& control) WASP_REALTIME;
@@ -92,6 +93,7 @@ class ControlLoop {
   std::array<std::uint8_t, 1024> out_{};
   std::array<TimeNs, control::kMaxBehaviours> last_exposed_{};
   TimeNs heartbeat_due_ns_ = 0, request_due_ns_ = 0;
+  drivers::CompanionState told_;  ///< in the last heartbeat
   int consecutive_misses_ = 0;
   FlightMode announced_mode_ = FlightMode::kDisarmed;
   std::uint8_t announced_phase_ = 255;

@@ -204,6 +204,7 @@ class Flight {
     w.index = static_cast<std::uint32_t>(i);
     w.budget_ns = config_.behaviours[i].budget_ns;
     w.frames_in_order = config_.behaviours[i].frames_in_order;
+    w.rules = rules_of(i);
     w.stages = &stages_;
     w.watch = &add_watch(config_.behaviours[i], true);
     if (replay_) {
@@ -218,6 +219,18 @@ class Flight {
     const CameraGeometry& camera = looks_down(row.stream) ? config_.camera_down.geometry : config_.camera;
     bodies_.push_back({i, row.make(camera, config_.behaviour_params[i], w)});
     return w.watch;
+  }
+
+  /// What a live camera promised. A replay is given as it was recorded.
+  FrameRules rules_of(std::size_t i) const {
+    if (replay_) return {};
+    const bool down = looks_down(table_[i].stream);
+    const Intrinsics& size = (down ? config_.camera_down.geometry : config_.camera).intrinsics;
+    return {.live = true,
+            .width_px = static_cast<std::uint32_t>(size.width_px),
+            .height_px = static_cast<std::uint32_t>(size.height_px),
+            .age_limit_ns = config_.control.arbiter.rows[i].age_limit_ns,
+            .stuck_frames = config_.stuck_frames};
   }
 
   SupervisorOptions supervisor_options() const {

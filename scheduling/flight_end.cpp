@@ -18,6 +18,11 @@ void say_counts(const FlightEnd& end, const LogLine& log) {
   say(status.skipped, "control releases were skipped");
   say(status.deadline_misses, "control deadlines were missed");
   say(status.commands_refused, "commands were refused as too old at the wire");
+  say(status.frames_duplicate, "frames were refused as repeated");
+  say(status.frames_disordered, "frames were refused as out of order");
+  say(status.frames_malformed, "frames were refused as malformed");
+  say(status.frames_misdated, "frames were refused as misdated");
+  say(status.samples_refused, "samples of the autopilot were refused");
   say(status.setpoints_flushed, "times an old setpoint was thrown out of a stalled serial line");
   log("page faults in real-time threads: " + std::to_string(status.minor_faults) + " minor, " +
       std::to_string(status.major_faults) + " major");

@@ -1,10 +1,13 @@
-// The reader's end of the ring that releases a behaviour: sleeps for a message, checks its header, gives views into the
-// slot - of a frame, of a frame and the depth frame of the same exposure, or of a flow field.
+// The reader's end of the ring that releases a behaviour: sleeps for a message, judges it (frame_judge.h), gives views
+// into the slot - of a frame, of a frame and the depth frame of the same exposure, or of a flow field.
 #pragma once
 
 #include <optional>
 
+#include "rt/clock.h"
 #include "scheduling/flow_ring.h"
+#include "scheduling/frame_judge.h"
+#include "scheduling/image_hash.h"
 #include "scheduling/stream_ring.h"
 
 namespace wasp::scheduling {
@@ -25,31 +28,35 @@ struct Frame {
 class FrameSource {
  public:
   /// Throws if the ring of the stream is absent or of another type.
-  FrameSource(const shm::Region& camera, const shm::Region& flight, Stream stream)
-      : reader_(is_flow(stream) ? flight : camera, ring_of(stream), type_of(stream)), stream_(stream) {
+  FrameSource(const shm::Region& camera, const shm::Region& flight, Stream stream, const FrameRules& rules = {})
+      : reader_(is_flow(stream) ? flight : camera, ring_of(stream), type_of(stream)), stream_(stream), judge_(rules) {
     if (stream == Stream::kGrayDepth && camera.has(shm::kDepth)) depth_.emplace(camera, shm::kDepth, "Frame");
   }
 
-  /// Messages overwritten before or during use, and those whose header was not believable.
+  /// Messages overwritten before or during use.
   [[nodiscard]] std::uint64_t lost() const noexcept { return reader_.lost(); }
-  [[nodiscard]] std::uint64_t malformed() const noexcept { return malformed_; }
+  /// Messages refused, by kind.
+  [[nodiscard]] const FrameCounts& counts() const noexcept { return judge_.counts(); }
   void from_the_start() noexcept { reader_.rewind(); }
 
-  /// The newest unread message (`in_order` false) or the oldest unread (true); empty on time-out. Realtime-safe: yes.
+  /// The newest unread message (`in_order` false) or the oldest unread (true); empty on time-out, and if what came was
+  /// refused. Realtime-safe: yes.
   Frame wait(TimeNs deadline_ns, bool in_order) WASP_REALTIME {
     if (!reader_.wait(deadline_ns)) return {};
     Frame frame;
     frame.sample = in_order ? reader_.next() : reader_.latest();
     if (!frame.sample) return {};
     const bool good = is_flow(stream_) ? take_flow(frame) : take_pixels(frame);
+    const std::uint64_t image = good ? hash_of(frame) : 0;
     if (!reader_.intact(frame.sample)) {
       reader_.count_lost();
       return {};
     }
     if (!good) {
-      ++malformed_;
+      judge_.note_malformed();
       return {};
     }
+    if (judge_.judge({frame.sequence, frame.shown_at_ns, image}, rt::now()) != FrameFault::kNone) return {};
     if (depth_) find_depth(frame);
     return frame;
   }
@@ -73,11 +80,27 @@ class FrameSource {
            static_cast<std::uint64_t>(h.stride_bytes) * h.height_px <= payload_bytes - kFramePixelOffset;
   }
 
+  /// Of the configured size; rows close together, or as far apart as the slot the camera reserved for them.
+  [[nodiscard]] bool as_promised(const FrameHeader& h, std::uint64_t payload_bytes) const WASP_REALTIME {
+    const FrameRules& rules = judge_.rules();
+    const std::uint32_t tight = h.width_px * (h.format == PixelFormat::kDepth16Mm ? 2 : 1);
+    if (rules.width_px == 0) return true;
+    return h.width_px == rules.width_px && h.height_px == rules.height_px &&
+           (h.stride_bytes == tight || h.stride_bytes == (payload_bytes - kFramePixelOffset) / h.height_px);
+  }
+
+  /// 0 where images are not compared.
+  [[nodiscard]] std::uint64_t hash_of(const Frame& frame) const WASP_REALTIME {
+    if (judge_.rules().stuck_frames == 0) return 0;
+    return stream_ == Stream::kDepth ? image_hash(frame.depth) : image_hash(frame.gray);
+  }
+
   bool take_pixels(Frame& frame) const WASP_REALTIME {
     FrameHeader h;
     __builtin_memcpy(&h, frame.sample.data, sizeof h);
     const bool depth = stream_ == Stream::kDepth;
-    if (!believable_frame(h, depth ? PixelFormat::kDepth16Mm : PixelFormat::kMono8, reader_.payload_bytes()))
+    if (!believable_frame(h, depth ? PixelFormat::kDepth16Mm : PixelFormat::kMono8, reader_.payload_bytes()) ||
+        !as_promised(h, reader_.payload_bytes()))
       return false;
     frame.shown_at_ns = frame.exposed_at_ns = h.exposed_at_ns;
     frame.sequence = h.sequence;
@@ -100,7 +123,7 @@ class FrameSource {
   }
 
   /// The camera publishes depth before the grey frame of the same exposure, so what belongs to it is there already.
-  void find_depth(Frame& frame) const WASP_REALTIME {
+  void find_depth(Frame& frame) WASP_REALTIME {
     const std::uint64_t newest = depth_->newest();
     for (std::uint64_t n = newest; n > 0 && newest - n < depth_->slots() - 1u; --n) {
       const shm::Sample sample = depth_->look(n);
@@ -108,9 +131,14 @@ class FrameSource {
       FrameHeader h;
       __builtin_memcpy(&h, sample.data, sizeof h);
       if (!depth_->intact(sample) || h.sequence != frame.sequence || h.exposed_at_ns != frame.exposed_at_ns) continue;
-      if (!believable_frame(h, PixelFormat::kDepth16Mm, depth_->payload_bytes())) return;
+      if (!believable_frame(h, PixelFormat::kDepth16Mm, depth_->payload_bytes()) ||
+          !as_promised(h, depth_->payload_bytes()))
+        return judge_.note_malformed();
+      const DepthView view = depth_view(sample.data, h);
+      const std::uint64_t image = judge_.rules().stuck_frames == 0 ? 0 : image_hash(view);
+      if (!depth_->intact(sample) || !judge_.depth_is_new(image)) return;
       frame.depth_sample = sample;
-      frame.depth = depth_view(sample.data, h);
+      frame.depth = view;
       return;
     }
   }
@@ -118,7 +146,7 @@ class FrameSource {
   shm::RingReader reader_;
   std::optional<shm::RingReader> depth_;
   Stream stream_;
-  std::uint64_t malformed_ = 0;
+  FrameJudge judge_;
 };
 
 }  // namespace wasp::scheduling

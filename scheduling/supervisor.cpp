@@ -36,7 +36,13 @@ Supervisor::Supervisor(WatchBoard& board, RunStatus& status, SupervisorOptions o
       status_(status),
       options_(std::move(options)),
       log_(std::move(log)),
-      folder_(options_.incident_dir, options_.incidents) {
+      folder_(options_.incident_dir, options_.incidents),
+      bursts_{{"camera frozen, the same image again and again", {{&status.frames_stuck, "times seen"}}},
+              {"frames refused",
+               {{&status.frames_duplicate, "duplicate"},
+                {&status.frames_disordered, "out of order"},
+                {&status.frames_malformed, "malformed"},
+                {&status.frames_misdated, "misdated"}}}} {
   for (auto& watch : board.threads) {
     if (watch.name == kControl) core_ = watch.core;
     subjects_.push_back({&watch});
@@ -60,6 +66,7 @@ void Supervisor::look() {
   if (missed) report();
   board_.frozen.store(0, std::memory_order_relaxed);  // a miss since then is taken at the next look, unfrozen
   for (auto& s : subjects_) demote_if_runaway(s);
+  for (auto& b : bursts_) b.look(looked_at_ns_, log_);
 }
 
 /// What the kernel has counted since the last look.

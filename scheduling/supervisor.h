@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "scheduling/burst_report.h"
 #include "scheduling/incident_folder.h"
 #include "scheduling/stage_table.h"
 #include "scheduling/switch_trace.h"
@@ -68,6 +69,7 @@ class Supervisor {
   std::unique_ptr<SwitchTrace> trace_;
   std::string trace_why_not_;
   std::vector<Subject> subjects_;
+  std::vector<BurstReport> bursts_;
   std::vector<KernelEvent> kernel_events_;
   std::optional<CoreCounts> core_before_, core_within_;
   int core_ = -1;

@@ -375,6 +375,79 @@ TEST(ControlStep, HoldsThenFailsafeWhenTheGroundIsLost) {
   EXPECT_GT(out.command.thrust, 0.75f);
 }
 
+/// A flight that behaviour 1 leans and turns as far as the limits allow; `in` is of its last tick.
+void lean(const ControlParams& p, ControlInput& in, ControlState& state) {
+  in_flight(p, in, state);
+  for (int i = 0; i < 40; ++i) {
+    in = good_input(in.now_ns + 50 * kMillisecond);
+    in.cues.present[1] = true;
+    Cue& cue = in.cues.cues[1];
+    cue.exposed_at_ns = in.now_ns - 40 * kMillisecond;
+    cue.body.validity = Validity::kValid;
+    cue.body.has_pitch = cue.body.has_heading_rate = 1;
+    cue.body.pitch_rad = cue.body.heading_rate_radps = 1.f;
+    control_step(p, in, state);
+  }
+}
+
+TEST(ControlStep, EveryFallToHoldOrFailsafeIsLevelInOneTickWithinTheThrustsRate) {
+  struct Fall {
+    const char* what;
+    FlightMode mode;
+    void (*happens)(ControlInput&);
+  };
+  const Fall falls[] = {
+      {"cues", FlightMode::kHold, [](ControlInput& in) { in.cues.present.fill(false); }},
+      {"deadlines", FlightMode::kHold, [](ControlInput& in) { in.deadlines_missed = true; }},
+      {"attitude", FlightMode::kFailsafe, [](ControlInput& in) { in.attitude_present = false; }},
+      {"attitude not finite", FlightMode::kFailsafe,
+       [](ControlInput& in) { in.attitude.q_ned_body[1] = std::numeric_limits<float>::quiet_NaN(); }},
+      {"link", FlightMode::kFailsafe, [](ControlInput& in) { in.autopilot.heard_at_ns -= kSecond; }},
+  };
+  const ControlParams p = params();
+  for (const Fall& fall : falls) {
+    ControlInput in;
+    ControlState state;
+    lean(p, in, state);
+    const Setpoint before = state.sent;
+    ASSERT_GT(before.pitch_rad, 0.25f);
+    ASSERT_GT(before.yaw_rate_radps, 0.7f);
+    ControlInput lost = good_input(in.now_ns + 50 * kMillisecond);
+    lost.cues = in.cues;
+    for (Cue& cue : lost.cues.cues) cue.exposed_at_ns = lost.now_ns - 40 * kMillisecond;
+    fall.happens(lost);
+    const ControlOutput out = control_step(p, lost, state);
+    EXPECT_EQ(out.command.mode, fall.mode) << fall.what;
+    EXPECT_EQ(state.sent.pitch_rad, 0.f) << fall.what;
+    EXPECT_EQ(out.command.q_ned_body[1], 0.f) << fall.what;
+    EXPECT_EQ(out.command.q_ned_body[2], 0.f) << fall.what;
+    EXPECT_EQ(out.command.yaw_rate_radps, 0.f) << fall.what;
+    EXPECT_LE(std::fabs(out.command.thrust - before.thrust), p.limits.max_thrust_rate_1ps * in.dt_s + 1e-6f);
+    EXPECT_GT(out.command.thrust, 0.6f) << fall.what;
+  }
+}
+
+TEST(ControlStep, TheWayBackFromLevelKeepsTheTiltRate) {
+  const ControlParams p = params();
+  ControlInput in;
+  ControlState state;
+  lean(p, in, state);
+  ControlInput next = good_input(in.now_ns + 50 * kMillisecond);
+  control_step(p, next, state);  // behaviour 1 is silent, but nothing fell: on its way by the rate
+  EXPECT_GT(state.sent.pitch_rad, 0.1f);
+  next = good_input(next.now_ns + 50 * kMillisecond);
+  next.cues.present.fill(false);
+  control_step(p, next, state);
+  ASSERT_EQ(state.sent.pitch_rad, 0.f);
+  next = good_input(next.now_ns + 50 * kMillisecond);
+  next.cues.cues[1] = in.cues.cues[1];
+  next.cues.present[1] = true;
+  next.cues.cues[1].exposed_at_ns = next.now_ns - 40 * kMillisecond;
+  control_step(p, next, state);
+  EXPECT_EQ(state.mode.mode, FlightMode::kBehaviour);
+  EXPECT_NEAR(state.sent.pitch_rad, p.limits.max_tilt_rate_radps * next.dt_s, 1e-4f);
+}
+
 TEST(ControlStep, StopStreamFailsafeSendsNothing) {
   ControlParams p = params();
   p.failsafe_action = FailsafeAction::kStopStream;
@@ -412,6 +485,11 @@ TEST(ControlStep, PropertyNothingWildEverLeaves) {
       in.cues.cues[b].exposed_at_ns = chance(6) ? t - 10 * kSecond : t - 40 * kMillisecond;
     }
     if (chance(5)) in.accel_body_mps2[2] = any_float(random);
+    for (float& q : in.attitude.q_ned_body)
+      if (chance(20)) q = any_float(random);
+    for (float& r : in.attitude.rate_body_radps)
+      if (chance(9)) r = any_float(random);
+    if (chance(9)) in.pressure_hpa = any_float(random);
     if (chance(7)) in.attitude_present = false;
     if (chance(9)) in.autopilot.follows = false;
     if (chance(50)) in.autopilot.armed = false;

@@ -27,6 +27,15 @@ TEST(Limits, WhateverIsWantedWhatIsSentStaysInsideRangeAndRate) {
   }
 }
 
+TEST(Limits, LevelIsOneStepAndLeavesTheThrustAlone) {
+  Setpoint s{0.26f, -0.26f, 0.8f, 0.7f};
+  level(s);
+  EXPECT_EQ(s.roll_rad, 0.f);
+  EXPECT_EQ(s.pitch_rad, 0.f);
+  EXPECT_EQ(s.yaw_rate_radps, 0.f);
+  EXPECT_EQ(s.thrust, 0.7f);
+}
+
 TEST(Limits, NonFiniteIsRefusedAndChangesNothing) {
   constexpr float kNan = std::numeric_limits<float>::quiet_NaN(), kInf = std::numeric_limits<float>::infinity();
   const Setpoint before{0.1f, -0.1f, 0.2f, 0.5f};

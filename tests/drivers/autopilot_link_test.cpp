@@ -351,10 +351,13 @@ TEST_F(AutopilotLinkTest, ASetpointThatIsNotFiniteIsNotEncoded) {
 
 TEST_F(AutopilotLinkTest, HeartbeatAndCommandsOut) {
   std::array<std::uint8_t, kMaxFrame> out{};
-  const auto beat = only<Heartbeat>(std::span(out).first(link_.encode_heartbeat(mav_state::kActive, out)));
+  const auto beat = only<Heartbeat>(
+      std::span(out).first(link_.encode_heartbeat({FlightMode::kHold, ModeReason::kCueLost, false, 3}, out)));
   EXPECT_EQ(beat.type, 18);
   EXPECT_EQ(beat.autopilot, 8);
   EXPECT_EQ(beat.mavlink_version, 3);
+  EXPECT_EQ(beat.system_status, mav_state::kCritical);
+  EXPECT_EQ(companion_state_of(beat.custom_mode), (CompanionState{FlightMode::kHold, ModeReason::kCueLost, false, 3}));
   const auto arm = only<CommandLong>(std::span(out).first(link_.encode_arm(true, 2, out)));
   EXPECT_EQ(arm.command, 400);
   EXPECT_EQ(arm.param1, 1);

@@ -165,6 +165,40 @@ TEST_F(BehaviourLoopTest, AHeaderThatLiesIsNotFollowed) {
   });
 }
 
+TEST_F(BehaviourLoopTest, NoStepIsMadeFromARefusedFrameAndEveryKindIsCounted) {
+  BehaviourWiring w = wiring();
+  w.rules = {.live = true, .width_px = kWidth, .height_px = kHeight, .age_limit_ns = 10 * kSecond, .stuck_frames = 2};
+  w.frames_in_order = true;
+  const RunStatus& status = run_status(flight_);
+  const auto until = [](const std::atomic<std::uint64_t>& word, std::uint64_t wanted) {
+    for (int i = 0; i < 60'000 && word.load() < wanted; ++i) rt::sleep_until(rt::now() + kMillisecond);
+    EXPECT_EQ(word.load(), wanted);
+  };
+  with_loop(w, [&] {
+    const TimeNs start_ns = rt::now() - kSecond;
+    publish_frame(1, 10, start_ns + 10);
+    EXPECT_EQ(wait_for_cue().frame_sequence, 1u);
+    publish_frame(2, 10, start_ns + 20);  // the image once more ...
+    until(status.frames_duplicate, 1);
+    EXPECT_EQ(status.frames_stuck.load(), 0u);
+    publish_frame(3, 10, start_ns + 30);  // ... and again
+    until(status.frames_stuck, 1);
+    publish_frame(4, 20, start_ns + 5);
+    until(status.frames_disordered, 1);
+    publish_frame(5, 30, start_ns + 100 * kSecond);
+    publish_frame(6, 40, start_ns - 100 * kSecond);
+    until(status.frames_misdated, 2);
+    publish_frame(7, 50, start_ns + 40, kWidth + 2);
+    until(status.frames_malformed, 1);
+    publish_frame(0, 60, start_ns + 50);  // the camera was started again
+    const Cue cue = wait_for_cue();
+    EXPECT_EQ(cue.frame_sequence, 0u);
+    EXPECT_FLOAT_EQ(cue.body.detail[1], 2.f);  // the second step
+  });
+  EXPECT_EQ(status.frames_duplicate.load(), 2u);
+  EXPECT_EQ(status.frames_lost.load(), 0u);
+}
+
 TEST_F(BehaviourLoopTest, ScriptSkipsFramesAndSuppliesAttitude) {
   BehaviourScript script(2);
   script[0].frame_sequence = 1;

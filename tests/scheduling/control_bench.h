@@ -10,6 +10,7 @@
 #include <atomic>
 #include <string>
 #include <thread>
+#include <variant>
 #include <vector>
 
 #include "messages/frame_parser.h"
@@ -59,6 +60,8 @@ struct BenchOptions {
   bool found_armed = false;
   int pressure_every = 0;  ///< so many inertial samples carry one pressure, and no cue a height; 0: the cue's height
 };
+
+using WireMessage = std::variant<mavlink::SetAttitudeTarget, mavlink::Heartbeat, mavlink::CommandLong>;
 
 class ControlBench {
  public:
@@ -135,13 +138,22 @@ class ControlBench {
       if (c.tick == tick) return &c;
     return nullptr;
   }
-  /// Setpoints that reached the wire since the last call, in order.
-  std::vector<mavlink::SetAttitudeTarget> setpoints() {
-    std::vector<mavlink::SetAttitudeTarget> list;
+  /// What reached the wire since the last call, in order.
+  std::vector<WireMessage> wire() {
+    std::vector<WireMessage> list;
     const auto bytes = line_.read();
     parser_.feed(bytes, [&](const mavlink::Frame& f) {
-      if (f.is<mavlink::SetAttitudeTarget>()) list.push_back(f.as<mavlink::SetAttitudeTarget>());
+      if (f.is<mavlink::SetAttitudeTarget>()) list.emplace_back(f.as<mavlink::SetAttitudeTarget>());
+      if (f.is<mavlink::Heartbeat>()) list.emplace_back(f.as<mavlink::Heartbeat>());
+      if (f.is<mavlink::CommandLong>()) list.emplace_back(f.as<mavlink::CommandLong>());
     });
+    return list;
+  }
+  /// Setpoints among them.
+  std::vector<mavlink::SetAttitudeTarget> setpoints() {
+    std::vector<mavlink::SetAttitudeTarget> list;
+    for (const auto& m : wire())
+      if (const auto* s = std::get_if<mavlink::SetAttitudeTarget>(&m)) list.push_back(*s);
     return list;
   }
   std::vector<std::string> event_texts() {
@@ -160,6 +172,7 @@ class ControlBench {
   shm::Region& flight_region() { return flight_; }
 
   LoopControl control;
+  std::atomic<bool> cues_stop{false}, attitude_stops{false}, autopilot_refuses{false}, autopilot_leaves{false};
   WatchBoard board;
   ThreadWatch* watch;
   std::vector<Command> commands;
@@ -190,7 +203,7 @@ class ControlBench {
     const TimeNs now_ns = rt::now();
     AttitudeSample attitude;
     attitude.exposed_at_ns = now_ns;
-    attitude_.write(attitude, now_ns);
+    if (!attitude_stops) attitude_.write(attitude, now_ns);
     ImuSample imu;
     imu.exposed_at_ns = now_ns;
     imu.accel_body_mps2 = {0, 0, -9.80665f};
@@ -204,12 +217,12 @@ class ControlBench {
     cue.body.has_pitch = 1;
     cue.body.height_m = 0.5f;
     cue.body.pitch_rad = 0.1f;  // never level: a level setpoint is not the behaviour's
-    cue_.write(cue, now_ns);
+    if (!cues_stop) cue_.write(cue, now_ns);
     Command command;
     if (commands_now_.copy_newest(command) &&
         command.mission_phase == static_cast<std::uint8_t>(control::MissionPhase::kArm))
-      armed_ = true;
-    report_.store({now_ns, armed_ ? 1u : 0u, armed_ ? 1u : 0u});
+      armed_ = armed_ || !autopilot_refuses;
+    report_.store({now_ns, armed_ ? 1u : 0u, armed_ && !autopilot_leaves ? 1u : 0u});
   }
   void take_commands() {
     Command c;

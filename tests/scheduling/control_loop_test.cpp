@@ -109,8 +109,8 @@ TEST(ControlLoop, ACueThatGrewTooOldBeforeTheWriteIsRefusedAndHoldGoesOut) {
     EXPECT_GE(bench.status().commands_refused.load(), 1u);
     EXPECT_TRUE(bench.said("command refused: its cue grew too old"));
     const auto [before, refused] = pitch_around(bench, stalled->computed_at_ns + kStall);
-    EXPECT_GT(before, 0.01f);    // the behaviour's
-    EXPECT_LT(refused, before);  // on its way to level
+    EXPECT_GT(before, 0.01f);  // the behaviour's
+    EXPECT_EQ(refused, 0.f);   // level at once
     return true;
   });
 }
@@ -126,6 +126,39 @@ TEST(ControlLoop, AnAttitudeThatGrewTooOldBeforeTheWriteMeansFailsafe) {
     EXPECT_TRUE(bench.said("command refused: its attitude grew too old"));
     return true;
   });
+}
+
+TEST(ControlLoop, TheHeartbeatTellsEveryChangeOfModeInTheWriteOfItsSetpoint) {
+  ControlBench bench({.cue_age_limit_ns = 100 * kMillisecond});
+  bench.status().incarnation = 2;
+  bench.start();
+  ASSERT_TRUE(bench.wait_until_flying());
+  bench.cues_stop = true;
+  ASSERT_TRUE(bench.wait_for_command([](const Command& c) { return c.mode == FlightMode::kHold; }));
+  ASSERT_TRUE(bench.wait_for_command([](const Command& c) { return c.mode == FlightMode::kFailsafe; }));
+  bench.end();
+  std::vector<drivers::CompanionState> told, meant;
+  const WireMessage* before = nullptr;
+  const auto wire = bench.wire();
+  for (const auto& message : wire) {
+    if (const auto* beat = std::get_if<mavlink::Heartbeat>(&message)) {
+      const auto state = drivers::companion_state_of(beat->custom_mode);
+      EXPECT_EQ(beat->system_status, drivers::system_status_of(state));
+      if (told.empty() || told.back() != state) told.push_back(state);
+      const auto* setpoint = before == nullptr ? nullptr : std::get_if<mavlink::SetAttitudeTarget>(before);
+      ASSERT_NE(setpoint, nullptr);
+      if (state.mode == FlightMode::kHold || state.mode == FlightMode::kFailsafe) {
+        EXPECT_EQ(setpoint->q[2], 0.f);  // the same write: level
+      }
+    }
+    before = &message;
+  }
+  for (const Command& c : bench.commands) {
+    const drivers::CompanionState state{c.mode, c.reason, false, 2};
+    if (meant.empty() || meant.back() != state) meant.push_back(state);
+  }
+  EXPECT_EQ(told, meant);
+  EXPECT_GE(told.size(), 4u);
 }
 
 TEST(ControlLoop, SamplesWithoutAPressureDoNotPullTheBarometricHeight) {

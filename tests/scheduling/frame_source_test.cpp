@@ -89,6 +89,30 @@ TEST_F(FrameSourceTest, DepthOverwrittenDuringTheStepSpoilsIt) {
   EXPECT_EQ(source.lost(), 1u);
 }
 
+TEST_F(FrameSourceTest, AStandingDepthImageBesideALivingGreyOneIsLeftOut) {
+  FrameSource source(camera_, flight_, Stream::kGrayDepth, {.live = true, .stuck_frames = 2});
+  const TimeNs start_ns = rt::now() - kSecond;
+  for (std::uint32_t n = 1; n <= 4; ++n) {
+    show<std::uint16_t>(depth_, n, start_ns + n, static_cast<std::uint16_t>(n < 4 ? 1000 : 2000));
+    show_gray(n, start_ns + n);
+    const Frame frame = take(source);
+    ASSERT_TRUE(frame) << n;
+    EXPECT_EQ(frame.depth.valid(), n == 1 || n == 4) << n;
+  }
+  EXPECT_EQ(source.counts().of(FrameFault::kDuplicate), 2u);
+  EXPECT_EQ(source.counts().frozen, 1u);
+}
+
+TEST_F(FrameSourceTest, AFrameOfAnotherSizeThanTheCameraPromisedIsRefused) {
+  FrameSource other(camera_, flight_, Stream::kGray, {.width_px = 2 * kWidth, .height_px = kHeight});
+  FrameSource source(camera_, flight_, Stream::kGray, {.width_px = kWidth, .height_px = kHeight});
+  show_gray(1, 100);
+  EXPECT_TRUE(take(source));
+  EXPECT_FALSE(take(other));
+  EXPECT_EQ(other.counts().of(FrameFault::kMalformed), 1u);
+  EXPECT_EQ(source.counts().of(FrameFault::kMalformed), 0u);
+}
+
 TEST_F(FrameSourceTest, AFlowFieldIsReadInPlaceAndOneThatLiesIsNotFollowed) {
   FrameSource source(camera_, flight_, Stream::kFlow);
   FlowWriter writer(flight_, shm::kFlow);
@@ -96,7 +120,7 @@ TEST_F(FrameSourceTest, AFlowFieldIsReadInPlaceAndOneThatLiesIsNotFollowed) {
   message.seen.columns = 17;  // beyond its own cells
   writer.publish(message, 5, rt::now());
   EXPECT_FALSE(take(source));
-  EXPECT_EQ(source.malformed(), 1u);
+  EXPECT_EQ(source.counts().of(FrameFault::kMalformed), 1u);
   message.seen.columns = 16;
   message.frame_sequence = 9;
   message.exposed_at_ns = 77;
