@@ -26,7 +26,8 @@ struct LinkReport {
   std::uint32_t custom_mode = 0;
 };
 
-/// A stall for tests, in the middle of a tick: between what the arbiter said and the write. Null in flight.
+/// A stall in the middle of a tick, between what the arbiter said and the write: for tests and for fault points. Null
+/// in a flight without faults.
 struct ControlHook {
   void (*before_write)(void* context, std::uint64_t tick) WASP_REALTIME = nullptr;
   void* context = nullptr;
@@ -74,6 +75,7 @@ class ControlLoop {
   void account_cues(const control::ControlInput& input, const Command& command, RunStatus& status) WASP_REALTIME;
   void report_miss(const Command& command, std::uint64_t skipped, bool missed) WASP_REALTIME;
   void end_of_tick(const control::ControlInput& input, LoopControl& control) WASP_REALTIME;
+  void mark(const control::ControlInput& input, const Command& command, LoopControl& control) WASP_REALTIME;
   void announce(const Command& command) WASP_REALTIME;
 
   Config config_;
