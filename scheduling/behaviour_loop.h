@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "rt/clock.h"
+#include "scheduling/behaviour_faults.h"
 #include "scheduling/frame_source.h"
 #include "scheduling/realtime_loop.h"
 #include "scheduling/replay_script.h"
@@ -48,6 +49,7 @@ class BehaviourLoop {
   /// Runs until the stop flag. Real-time loop.
   void run(LoopControl& control) {
     RealtimeLoop loop(control, *wiring_.watch);
+    faults_.use(control, wiring_.index);
     const bool in_order = wiring_.frames_in_order || wiring_.frames_done != nullptr;
     if (wiring_.frames_done != nullptr) frames_.from_the_start();
     while (loop.tick()) cycle(control, in_order);
@@ -85,7 +87,9 @@ class BehaviourLoop {
     BehaviourInput input;
     if (gather(frame, input)) {
       wiring_.watch->busy_since_ns.store(cue.started_at_ns, std::memory_order_relaxed);
+      faults_.before(input);
       cue.body = B::step(params_, input, state_);
+      faults_.after(cue.body);
       cue.finished_at_ns = rt::now();
       wiring_.watch->busy_since_ns.store(0, std::memory_order_relaxed);
       if (frames_.intact(frame)) {
@@ -119,7 +123,7 @@ class BehaviourLoop {
   }
 
   void publish(const Frame& frame, const BehaviourInput& input, Cue& cue) WASP_REALTIME {
-    cue.exposed_at_ns = frame.shown_at_ns;
+    cue.exposed_at_ns = faults_.exposure(frame.shown_at_ns);
     cue.released_at_ns = frame.sample.published_at_ns;
     cue.behaviour = wiring_.index;
     cue.frame_sequence = input.frame_sequence;
@@ -133,7 +137,7 @@ class BehaviourLoop {
     cue.over_budget = compute_ns > wiring_.budget_ns ? 1 : 0;
     wake_->record(cue.started_at_ns - cue.released_at_ns);
     compute_->record(compute_ns);
-    cues_.write(cue, rt::now());
+    if (!faults_.silent()) cues_.write(cue, rt::now());
     hold_against_budget(cue, compute_ns);
   }
 
@@ -168,6 +172,7 @@ class BehaviourLoop {
   VehicleHistory vehicle_;
   shm::RingWriter cues_;
   std::optional<FlowWriter> flow_;  ///< of a flow source
+  BehaviourFaults faults_;
   Stage* wake_;
   Stage* compute_;
   std::uint32_t steps_ = 0;

@@ -12,6 +12,7 @@ namespace {
 constexpr DurationNs kHeartbeatPeriod = 1 * kSecond;
 constexpr DurationNs kRequestPeriod = 500 * kMillisecond;
 constexpr int kMissesBeforeHold = 2;
+constexpr float kOffTheGround_m = 0.2f;
 
 }  // namespace
 
@@ -63,8 +64,20 @@ void ControlLoop::tick(const rt::Release& release, LoopControl& control) WASP_RE
   account(input, command, release.skipped, control);
   commands_.write(command, rt::now());
   announce(command);
+  mark(input, command, control);
   end_of_tick(input, control);
   beat(input, output);
+}
+
+/// What the mission has reached.
+void ControlLoop::mark(const control::ControlInput& input, const Command& command, LoopControl& control) WASP_REALTIME {
+  const auto phase = state_.mission.phase;
+  const bool leg = control::leg_of(phase) >= 0;
+  const float climbed_m = command.height_m - state_.mission.ground_height_m;
+  if (input.autopilot.armed) control.marks.reach(Milestone::kArmed, input.now_ns);
+  if (leg && (climbed_m >= kOffTheGround_m || config_.control.mission.follow_recording))
+    control.marks.reach(Milestone::kFlying, input.now_ns);
+  if (phase == control::MissionPhase::kLand) control.marks.reach(Milestone::kLanding, input.now_ns);
 }
 
 /// What a release itself says: how late, and whether others were passed over.

@@ -27,7 +27,8 @@ struct LinkReport {
   std::uint32_t custom_mode = 0;
 };
 
-/// A stall for tests, in the middle of a tick: between what the arbiter said and the write. Null in flight.
+/// A stall in the middle of a tick, between what the arbiter said and the write: for tests and for fault points. Null
+/// in a flight without faults.
 struct ControlHook {
   void (*before_write)(void* context, std::uint64_t tick) WASP_REALTIME = nullptr;
   void* context = nullptr;
@@ -80,6 +81,7 @@ class ControlLoop {
   [[nodiscard]] bool line_is_ours() const WASP_REALTIME;
   void beat(const control::ControlInput& input, const control::ControlOutput& output) WASP_REALTIME;
   void last_beat() noexcept;
+  void mark(const control::ControlInput& input, const Command& command, LoopControl& control) WASP_REALTIME;
   void announce(const Command& command) WASP_REALTIME;
 
   Config config_;

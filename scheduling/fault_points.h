@@ -84,7 +84,25 @@ enum class FaultPoint : std::uint8_t {
 
 inline constexpr std::size_t kFaultPoints = static_cast<std::size_t>(FaultPoint::kCount);
 
-/// "camera.freeze" etc.
+/// Where and at what a point may be aimed.
+enum class FaultUse : std::uint8_t {
+  kAnyFlight,
+  kLiveCamera,  ///< refused in a replay, whose frames must reach their behaviours as recorded
+  kBehaviour,   ///< may name a behaviour; else every one is meant
+  kMoment,      ///< happens at once, lasts no time
+};
+
+/// What is known of a point.
+struct FaultRow {
+  std::string_view name;  ///< "camera.freeze"
+  FaultUse use = FaultUse::kAnyFlight;
+  float value = 0, low = 0, high = 0;  ///< default and range; low == high: it takes none
+  std::string_view unit;
+  std::string_view effect;  ///< one line
+  [[nodiscard]] constexpr bool takes_value() const noexcept { return low < high; }
+};
+
+const FaultRow& row_of(FaultPoint point) noexcept;
 std::string_view name_of(FaultPoint point) noexcept;
 std::optional<FaultPoint> fault_point_named(std::string_view name) noexcept;
 
@@ -125,6 +143,11 @@ class FaultBoard {
   };
   std::array<Switch, kFaultPoints> switches_{};
 };
+
+/// A value in milliseconds. Realtime-safe: yes.
+inline DurationNs milliseconds_of(const FaultBoard& board, FaultPoint point) WASP_REALTIME {
+  return static_cast<DurationNs>(static_cast<double>(board.value(point)) * static_cast<double>(kMillisecond));
+}
 
 /// True where a board exists and the point is on. Realtime-safe: yes; one branch without a board.
 inline bool fault_on(const FaultBoard* board, FaultPoint point, TimeNs now_ns,

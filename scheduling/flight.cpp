@@ -12,7 +12,9 @@
 #include "rt/process.h"
 #include "rt/thread.h"
 #include "scheduling/arming.h"
+#include "scheduling/control_faults.h"
 #include "scheduling/control_loop.h"
+#include "scheduling/fault_control.h"
 #include "scheduling/flight_end.h"
 #include "scheduling/flight_options.h"
 #include "scheduling/flight_regions.h"
@@ -107,12 +109,15 @@ class Flight {
 
   int run(const sigset_t& signals) {
     open_camera();
+    arm_faults();
     wire();
     admit(make_plan(config_, frame_period_ns_, replay_ != nullptr, measured_costs()), config_.admission, real_time_,
           log);
     latency_hold_ = prepare_real_time(config_, real_time_, log);
     start_threads();
     control_.realtime_started = true;
+    control_.marks.reach(Milestone::kStart, rt::now());
+    if (faults_) faults_->start(control_.marks);
     flight_files_.keep = camera_files_.keep = true;  // the recorder drains them; the launcher removes them
     log(real_time_ ? "armed for real time" : "running, NOT REAL TIME");
     if (incarnation() > 0) log("started again by the guardian: watching, never commanding");
@@ -156,6 +161,16 @@ class Flight {
     if (options_.preload) replay_->preload();
   }
 
+  /// Makes the fault points, if asked for: without an option there is no board, and no point can be thrown.
+  void arm_faults() {
+    if (options_.faults.empty() && options_.fault_socket.empty()) return;
+    FaultSetup setup{options_.faults, options_.fault_socket, {{}, replay_ == nullptr}};
+    for (const auto& row : config_.behaviours) setup.scope.behaviours.push_back(row.enabled ? row.name : "");
+    faults_ = std::make_unique<FaultControl>(setup, log);
+    control_.faults = &faults_->board();
+    control_.status->faults_armed = 1;
+  }
+
   /// Refuses a camera that does not offer what an enabled behaviour looks at.
   void check_camera() const {
     for (std::size_t i = 0; i < table_.size(); ++i) {
@@ -191,6 +206,7 @@ class Flight {
                                        add_watch(config_.link_thread));
     control.watch = &add_watch(config_.control_thread);
     control.guard = guard_ ? &guard_->block() : nullptr;
+    if (faults_) control.hook = control_fault_hook(control_);
     control_loop_ = std::make_unique<ControlLoop>(config_, control);
     supervisor_ = std::make_unique<Supervisor>(board_, *control_.status, supervisor_options(), log);
   }
@@ -277,6 +293,7 @@ class Flight {
       supervisor_->look();
     }
     control_.stop = true;
+    if (faults_) faults_->stop();
     threads_.clear();
     supervisor_->look();
     drain_events();
@@ -308,6 +325,7 @@ class Flight {
   std::unique_ptr<LinkLoop> link_;
   std::unique_ptr<ControlLoop> control_loop_;
   std::unique_ptr<Supervisor> supervisor_;
+  std::unique_ptr<FaultControl> faults_;  ///< null: no fault points exist
   std::vector<ThreadBody> bodies_;
   std::vector<rt::Thread> threads_;  // joined first
 };

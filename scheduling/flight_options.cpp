@@ -23,6 +23,10 @@ std::optional<int> parse_flight_options(int argc, char** argv, FlightOptions& o)
   app.add_option("--measured", o.measured,
                  "admission by this log/stages.json of an earlier flight, not by configured budgets")
       ->check(CLI::ExistingFile);
+  app.add_option("--faults", o.faults, "arm the fault points and run this timeline (docs/faults.md)")
+      ->check(CLI::ExistingFile);
+  app.add_option("--fault-socket", o.fault_socket,
+                 "arm the fault points and take faults on a control socket made here");
   app.add_flag("--no-rt", o.no_rt, "ordinary scheduling, no locked memory; every figure is marked 'not real time'");
   app.add_flag("--guarded", o.guarded,
                "started by `wasp guard`: the serial line is inherited, and the control thread beats");

@@ -14,6 +14,8 @@ struct FlightOptions {
   bool preload = false;  ///< decode the whole recording before arming
   double seconds = 0;
   std::string measured;
+  std::string faults;        ///< timeline of faults; empty: none
+  std::string fault_socket;  ///< where faults are taken live; empty: nowhere. Both empty: no fault points exist
   bool no_rt = false;
   bool check_rights = false;
   bool guarded = false;  ///< started by a guardian: page and line are inherited (guard_page.h)

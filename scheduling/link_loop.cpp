@@ -26,6 +26,7 @@ LinkLoop::LinkLoop(const shm::Region& flight, drivers::SerialPort& port, drivers
 
 void LinkLoop::run(LoopControl& control) {
   RealtimeLoop loop(control, watch_);
+  faults_.use(control.faults);
   while (loop.tick()) {
     if (gone_)
       reopen(control);
@@ -81,14 +82,18 @@ void LinkLoop::reopen(LoopControl& control) {
   events_.say(rt::now(), "serial line reopened");
 }
 
-void LinkLoop::on_imu(const ImuSample& sample) WASP_REALTIME {
+void LinkLoop::on_imu(const ImuSample& received) WASP_REALTIME {
   heard_ = true;
+  ImuSample sample = received;
+  if (!faults_.pass(sample, received_at_ns_)) return;
   imu_.write(sample, received_at_ns_);
   age_->record(received_at_ns_ - sample.exposed_at_ns);
 }
 
-void LinkLoop::on_attitude(const AttitudeSample& sample) WASP_REALTIME {
+void LinkLoop::on_attitude(const AttitudeSample& received) WASP_REALTIME {
   heard_ = true;
+  AttitudeSample sample = received;
+  if (!faults_.pass(sample, received_at_ns_)) return;
   attitude_.write(sample, received_at_ns_);
 }
 

@@ -9,6 +9,7 @@
 #include "scheduling/control_loop.h"
 #include "scheduling/events.h"
 #include "scheduling/realtime_loop.h"
+#include "scheduling/sample_faults.h"
 #include "shm/broadcast_ring.h"
 
 namespace wasp::scheduling {
@@ -41,6 +42,7 @@ class LinkLoop {
   rt::Seqlock<LinkReport>& report_;
   EventQueue& events_;
   ThreadWatch& watch_;
+  SampleFaults faults_;
   LinkReport now_;
   TimeNs received_at_ns_ = 0, timesync_due_ns_ = 0;
   bool gone_ = false;

@@ -6,6 +6,7 @@
 #include "rt/contract.h"
 #include "rt/syscall_filter.h"
 #include "scheduling/fault_points.h"
+#include "scheduling/mission_marks.h"
 #include "scheduling/stage_table.h"
 #include "scheduling/thread_watch.h"
 
@@ -18,6 +19,7 @@ struct LoopControl {
   std::atomic<bool> overrun_stop{false};      ///< ... because a thread with the policy "stop" overran
   std::atomic<bool> realtime_started{false};  ///< set once every thread stands: faults count from here
   std::atomic<bool> flying{false};            ///< set once the mission has left the ground: a replay starts then
+  MissionMarks marks;                         ///< what the mission has reached, and when
   bool strict_syscalls = false;
   const FaultBoard* faults = nullptr;  ///< null unless the flight was started with faults
   RunStatus* status = nullptr;

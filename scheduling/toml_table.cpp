@@ -74,6 +74,19 @@ void TomlTable::numbers(const char* key, std::vector<double>& out, double low, d
   out = xs;
 }
 
+std::vector<TomlTable> TomlTable::tables(const char* key, std::size_t most) {
+  std::vector<TomlTable> list;
+  const toml::value* v = find(key);
+  if (v == nullptr) return list;
+  if (!v->is_array()) fail(*v, "must be tables: [[" + std::string(key) + "]]");
+  if (v->as_array().size() > most) fail(*v, "more than " + std::to_string(most) + " tables");
+  for (const auto& item : v->as_array()) {
+    if (!item.is_table()) fail(item, "must be a table");
+    list.emplace_back(item);
+  }
+  return list;
+}
+
 TomlTable TomlTable::table(const char* key) {
   const toml::value* v = find(key);
   if (v == nullptr) return TomlTable(toml::table{});

@@ -45,6 +45,11 @@ class TomlTable {
   /// `allowed` empty: any text.
   void text_value(const char* key, std::string& out, const std::vector<std::string>& allowed = {});
   void numbers(const char* key, std::vector<double>& out, double low, double high);
+  [[nodiscard]] bool has(const char* key) const { return value_.is_table() && value_.contains(key); }
+  /// The tables [[key]], in order; none if absent.
+  std::vector<TomlTable> tables(const char* key, std::size_t most);
+  /// Throws naming file and line of this table.
+  [[noreturn]] void refuse(const std::string& why) const { fail(value_, why); }
   /// Child table; an empty one if absent.
   TomlTable table(const char* key);
   /// Takes over every key of `later`, which wins.
