@@ -13,6 +13,8 @@
 namespace wasp::drivers {
 namespace {
 
+constexpr TimeNs kLatest = INT64_MAX / 2;  ///< the year 2116: differences of two instants up to it fit
+
 /// Decimal seconds to nanoseconds without passing through a double, which holds epoch times to 0.2 us only.
 bool parse_seconds(const std::string& text, TimeNs& out) {
   const std::size_t dot = text.find('.');
@@ -21,7 +23,7 @@ bool parse_seconds(const std::string& text, TimeNs& out) {
   fraction.append(9 - fraction.size(), '0');
   const std::string digits = text.substr(0, dot) + fraction;
   const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), out);
-  return error == std::errc{} && end == digits.data() + digits.size() && dot != 0;
+  return error == std::errc{} && end == digits.data() + digits.size() && dot != 0 && out >= 0 && out <= kLatest;
 }
 
 double number(const toml::value& value, const std::string& key, const std::filesystem::path& file, double low,
