@@ -114,7 +114,8 @@ constexpr std::size_t kMostDeflated = 1032;  ///< deflate makes at most this man
 
 /// Before memory is asked for: refuses a file too small for the pixels its header claims.
 void check_room(const std::filesystem::path& file, std::size_t pixel_bytes, std::size_t most_of_one_byte) {
-  if (std::filesystem::file_size(file) < pixel_bytes / most_of_one_byte) fail(file, "truncated: smaller than its image");
+  if (std::filesystem::file_size(file) < pixel_bytes / most_of_one_byte)
+    fail(file, "truncated: smaller than its image");
 }
 
 /// Bits of one pixel in the file; asked before the conversions.

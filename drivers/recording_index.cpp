@@ -8,7 +8,8 @@
 #include <limits>
 #include <sstream>
 #include <stdexcept>
-#include <toml.hpp>
+
+#include "drivers/toml_text.h"
 
 namespace wasp::drivers {
 namespace {
@@ -120,12 +121,7 @@ std::vector<ListedFrame> pair_frames(const std::vector<ListedFrame>& depth, cons
 }
 
 void read_camera_toml(const std::filesystem::path& file, Listing& listing) {
-  toml::value root;
-  try {
-    root = toml::parse(file.string());
-  } catch (const std::exception& error) {
-    throw std::runtime_error(file.string() + ": " + error.what());
-  }
+  const toml::value root = parse_toml_file(file);
   Intrinsics& k = listing.intrinsics;
   const auto real = [](double x) { return static_cast<float>(x); };
   for (const auto& [key, value] : root.as_table()) {

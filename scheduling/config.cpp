@@ -65,8 +65,7 @@ void read_autopilot(TomlTable t, Config& c) {
 void read_vector(TomlTable& t, const char* key, std::span<float> out, double low, double high) {
   std::vector<double> numbers;
   t.numbers(key, numbers, low, high);
-  if (!numbers.empty() && numbers.size() != out.size())
-    t.refuse(fmt::format("'{}' needs {} numbers", key, out.size()));
+  if (!numbers.empty() && numbers.size() != out.size()) t.refuse(fmt::format("'{}' needs {} numbers", key, out.size()));
   for (std::size_t i = 0; i < numbers.size(); ++i) out[i] = static_cast<float>(numbers[i]);
 }
 
@@ -195,8 +194,7 @@ void read_control(TomlTable t, Config& c) {
   t.number("max_tilt_deg", tilt_deg, 1, 45);
   c.control.limits.max_tilt_rad = static_cast<float>(to_radians(Degrees{tilt_deg}).value);
   t.finish();
-  if (hold.mass_kg * 9.81f > 0.95f * hold.full_thrust_n)
-    t.refuse("the vehicle is too heavy for its thrust");
+  if (hold.mass_kg * 9.81f > 0.95f * hold.full_thrust_n) t.refuse("the vehicle is too heavy for its thrust");
 }
 
 void read_behaviours(TomlTable t, Config& c, bool foreign_behaviours) {

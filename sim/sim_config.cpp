@@ -7,7 +7,8 @@
 #include <sstream>
 #include <stdexcept>
 #include <string_view>
-#include <toml.hpp>
+
+#include "drivers/toml_text.h"
 
 namespace wasp::sim {
 namespace {
@@ -286,12 +287,7 @@ Scene generated_scene(const SimConfig& config) {
 
 SimConfig parse_sim_config(const std::string& toml_text, const std::string& name) {
   std::istringstream stream(toml_text);
-  toml::value document;
-  try {
-    document = toml::parse(stream, name);
-  } catch (const std::exception& error) {
-    fail(name, error.what());
-  }
+  const toml::value document = drivers::parse_toml(stream, name);
   Draft draft;
   for (const bool preset : {true, false})  // it sets what other keys then change
     for (const auto& [section, table] : document.as_table()) {
