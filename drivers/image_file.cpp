@@ -25,7 +25,15 @@ namespace {
 
 using File = std::unique_ptr<std::FILE, int (*)(std::FILE*)>;
 
+/// A pipe or a terminal would keep whoever reads it waiting.
+void check_regular(const std::filesystem::path& file) {
+  std::error_code error;
+  const auto status = std::filesystem::status(file, error);
+  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) fail(file, "not a regular file");
+}
+
 File open_file(const std::filesystem::path& file, const char* mode) {
+  check_regular(file);
   File handle(std::fopen(file.c_str(), mode), &std::fclose);
   if (handle == nullptr) fail(file, std::string("cannot open: ") + std::strerror(errno));
   return handle;
@@ -102,6 +110,19 @@ ImageInfo png_info(const PngReader& reader, const std::filesystem::path& file) {
           (png_get_color_type(reader.png, reader.info) & PNG_COLOR_MASK_COLOR) != 0};
 }
 
+constexpr std::size_t kMostDeflated = 1032;  ///< deflate makes at most this many bytes of one
+
+/// Before memory is asked for: refuses a file too small for the pixels its header claims.
+void check_room(const std::filesystem::path& file, std::size_t pixel_bytes, std::size_t most_of_one_byte) {
+  if (std::filesystem::file_size(file) < pixel_bytes / most_of_one_byte)
+    fail(file, "truncated: smaller than its image");
+}
+
+/// Bits of one pixel in the file; asked before the conversions.
+std::size_t bits_stored(const PngReader& reader) {
+  return std::size_t{png_get_bit_depth(reader.png, reader.info)} * png_get_channels(reader.png, reader.info);
+}
+
 template <class T>
 Image<T> load_png(const std::filesystem::path& file) {
   const File handle = open_file(file, "rb");
@@ -109,10 +130,11 @@ Image<T> load_png(const std::filesystem::path& file) {
   if (reader.info == nullptr) fail(file, "libpng could not start");
   if (!read_header(reader, handle.get())) fail(file, reader.message.text);
   const ImageInfo info = png_info(reader, file);
+  const auto width = static_cast<std::size_t>(info.width_px), height = static_cast<std::size_t>(info.height_px);
+  check_room(file, width * height * bits_stored(reader) / 8, kMostDeflated);
   constexpr bool kWant16 = sizeof(T) == 2;
   if (kWant16 && (info.bits != 16 || info.colour)) fail(file, "expected a 16-bit grey PNG (depth)");
   if (!set_conversions(reader, kWant16)) fail(file, reader.message.text);
-  const auto width = static_cast<std::size_t>(info.width_px), height = static_cast<std::size_t>(info.height_px);
   if (png_get_rowbytes(reader.png, reader.info) != width * sizeof(T)) fail(file, "unsupported PNG pixel format");
   Image<T> image{info.width_px, info.height_px, std::vector<T>(width * height)};
   std::vector<png_bytep> rows(height);
@@ -164,9 +186,13 @@ PgmHeader pgm_header(std::istream& in, const std::filesystem::path& file) {
 
 std::size_t pgm_sample_bytes(const PgmHeader& header) { return header.maxval > 255 ? 2 : 1; }
 
+std::size_t pgm_bytes(const PgmHeader& header) {
+  return static_cast<std::size_t>(header.width_px) * static_cast<std::size_t>(header.height_px) *
+         pgm_sample_bytes(header);
+}
+
 std::vector<unsigned char> pgm_payload(std::istream& in, const PgmHeader& header, const std::filesystem::path& file) {
-  std::vector<unsigned char> bytes(static_cast<std::size_t>(header.width_px) *
-                                   static_cast<std::size_t>(header.height_px) * pgm_sample_bytes(header));
+  std::vector<unsigned char> bytes(pgm_bytes(header));
   in.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
   if (in.gcount() != static_cast<std::streamsize>(bytes.size())) fail(file, "truncated PGM");
   return bytes;
@@ -175,6 +201,7 @@ std::vector<unsigned char> pgm_payload(std::istream& in, const PgmHeader& header
 bool is_pgm(const std::filesystem::path& file) { return file.extension() == ".pgm"; }
 
 std::ifstream open_pgm(const std::filesystem::path& file) {
+  check_regular(file);
   std::ifstream in(file, std::ios::binary);
   if (!in) fail(file, "cannot open");
   return in;
@@ -186,6 +213,7 @@ Image<T> load_pgm(const std::filesystem::path& file) {
   const PgmHeader header = pgm_header(in, file);
   if (pgm_sample_bytes(header) != sizeof(T))
     fail(file, sizeof(T) == 2 ? "expected a 16-bit PGM (maxval > 255)" : "expected an 8-bit PGM (maxval <= 255)");
+  check_room(file, pgm_bytes(header), 1);
   const std::vector<unsigned char> bytes = pgm_payload(in, header, file);
   Image<T> image{header.width_px, header.height_px, std::vector<T>(bytes.size() / sizeof(T))};
   for (std::size_t i = 0; i < image.pixels.size(); ++i)
@@ -232,9 +260,7 @@ ImageInfo probe_image(const std::filesystem::path& file) {
   if (is_pgm(file)) {
     std::ifstream in = open_pgm(file);
     const PgmHeader header = pgm_header(in, file);
-    const std::size_t samples = static_cast<std::size_t>(header.width_px) * static_cast<std::size_t>(header.height_px);
-    if (std::filesystem::file_size(file) < header.payload_at + samples * pgm_sample_bytes(header))
-      fail(file, "truncated PGM");
+    if (std::filesystem::file_size(file) < header.payload_at + pgm_bytes(header)) fail(file, "truncated PGM");
     return {header.width_px, header.height_px, static_cast<int>(8 * pgm_sample_bytes(header)), false};
   }
   const File handle = open_file(file, "rb");

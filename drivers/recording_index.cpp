@@ -8,10 +8,13 @@
 #include <limits>
 #include <sstream>
 #include <stdexcept>
-#include <toml.hpp>
+
+#include "drivers/toml_text.h"
 
 namespace wasp::drivers {
 namespace {
+
+constexpr TimeNs kLatest = INT64_MAX / 2;  ///< the year 2116: differences of two instants up to it fit
 
 /// Decimal seconds to nanoseconds without passing through a double, which holds epoch times to 0.2 us only.
 bool parse_seconds(const std::string& text, TimeNs& out) {
@@ -21,7 +24,7 @@ bool parse_seconds(const std::string& text, TimeNs& out) {
   fraction.append(9 - fraction.size(), '0');
   const std::string digits = text.substr(0, dot) + fraction;
   const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), out);
-  return error == std::errc{} && end == digits.data() + digits.size() && dot != 0;
+  return error == std::errc{} && end == digits.data() + digits.size() && dot != 0 && out >= 0 && out <= kLatest;
 }
 
 double number(const toml::value& value, const std::string& key, const std::filesystem::path& file, double low,
@@ -118,12 +121,7 @@ std::vector<ListedFrame> pair_frames(const std::vector<ListedFrame>& depth, cons
 }
 
 void read_camera_toml(const std::filesystem::path& file, Listing& listing) {
-  toml::value root;
-  try {
-    root = toml::parse(file.string());
-  } catch (const std::exception& error) {
-    throw std::runtime_error(file.string() + ": " + error.what());
-  }
+  const toml::value root = parse_toml_file(file);
   Intrinsics& k = listing.intrinsics;
   const auto real = [](double x) { return static_cast<float>(x); };
   for (const auto& [key, value] : root.as_table()) {

@@ -21,6 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 using Names = std::vector<std::string>;  // of the regular files in the folder, sorted
 
+constexpr double kLongestClip_s = 1e6;
 constexpr DurationNs kPairTolerance = 17 * kMillisecond;  // half a period of a 30 Hz camera
 
 Names file_names(const fs::path& folder) {
@@ -141,7 +142,7 @@ std::map<std::uint32_t, TimeNs> frame_times(const fs::path& file, std::vector<st
     std::uint32_t frame = 0;
     char comma = 0;
     double t_s = 0;
-    if (fields >> frame >> comma >> t_s && comma == ',')
+    if (fields >> frame >> comma >> t_s && comma == ',' && t_s >= 0 && t_s <= kLongestClip_s)
       times[frame] = std::llround(t_s * 1e9);
     else
       problems.push_back(file.string() + ":" + std::to_string(number) + ": expected <frame>,<seconds>,...");
@@ -206,7 +207,11 @@ std::optional<Listing> list_asl(const fs::path& folder, const Names& names) {
     const std::size_t digits = name.find_first_not_of("0123456789");
     if (digits == std::string::npos || digits < kDigits || digits > 19 || name.substr(digits) != ".png") continue;
     const auto index = static_cast<std::uint32_t>(listing.frames.size());
-    listing.frames.push_back({std::stoll(name), index, {}, folder / name, name});
+    TimeNs time_ns = 0;
+    if (std::from_chars(name.data(), name.data() + digits, time_ns).ec != std::errc{} || time_ns > INT64_MAX / 2)
+      listing.problems.push_back((folder / name).string() + ": no time in nanoseconds");
+    else
+      listing.frames.push_back({time_ns, index, {}, folder / name, name});
   }
   if (listing.frames.empty()) return std::nullopt;
   assume_centred(listing.frames.front().gray_file, listing);

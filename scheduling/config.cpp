@@ -65,8 +65,7 @@ void read_autopilot(TomlTable t, Config& c) {
 void read_vector(TomlTable& t, const char* key, std::span<float> out, double low, double high) {
   std::vector<double> numbers;
   t.numbers(key, numbers, low, high);
-  if (!numbers.empty() && numbers.size() != out.size())
-    throw ConfigError(fmt::format("'{}' needs {} numbers", key, out.size()));
+  if (!numbers.empty() && numbers.size() != out.size()) t.refuse(fmt::format("'{}' needs {} numbers", key, out.size()));
   for (std::size_t i = 0; i < numbers.size(); ++i) out[i] = static_cast<float>(numbers[i]);
 }
 
@@ -139,14 +138,14 @@ void read_mission(TomlTable t, control::MissionParams& m) {
   t.finish();
   if (heights.empty() && seconds.empty()) return;
   if (heights.size() != seconds.size() || heights.size() > control::MissionParams::kMaxLegs)
-    throw ConfigError("mission.heights_m and mission.seconds must have the same length, 1 to 8");
+    t.refuse("mission.heights_m and mission.seconds must have the same length, 1 to 8");
   m.leg_count = static_cast<int>(heights.size());
   for (std::size_t i = 0; i < heights.size(); ++i)
     m.legs[i].height_m = static_cast<float>(heights[i]), m.legs[i].seconds = static_cast<float>(seconds[i]);
   for (const LegColumn& c : legs) {
     if (c.values.empty()) continue;
     if (c.values.size() != heights.size())
-      throw ConfigError(std::string("mission.") + c.key + " must have as many values as mission.heights_m");
+      t.refuse(std::string("mission.") + c.key + " must have as many values as mission.heights_m");
     for (std::size_t i = 0; i < c.values.size(); ++i) c.set(m.legs[i], static_cast<float>(c.values[i]));
   }
 }
@@ -167,7 +166,7 @@ void read_velocity(TomlTable& t, control::ControlParams& p) {
   t.number("standing_height_m", p.barometer.standing_height_m, 0, 5);
   t.number("min_height_m", p.min_height_m, 0.05, 100);
   t.number("max_height_m", p.max_height_m, 0.1, 120);
-  if (p.min_height_m >= p.max_height_m) throw ConfigError("control.min_height_m must be below control.max_height_m");
+  if (p.min_height_m >= p.max_height_m) t.refuse("control.min_height_m must be below control.max_height_m");
 }
 
 void read_control(TomlTable t, Config& c) {
@@ -196,8 +195,7 @@ void read_control(TomlTable t, Config& c) {
   t.number("max_tilt_deg", tilt_deg, 1, 45);
   c.control.limits.max_tilt_rad = static_cast<float>(to_radians(Degrees{tilt_deg}).value);
   t.finish();
-  if (hold.mass_kg * 9.81f > 0.95f * hold.full_thrust_n)
-    throw ConfigError("control: the vehicle is too heavy for its thrust");
+  if (hold.mass_kg * 9.81f > 0.95f * hold.full_thrust_n) t.refuse("the vehicle is too heavy for its thrust");
 }
 
 void read_behaviours(TomlTable t, Config& c, bool foreign_behaviours) {
@@ -259,8 +257,10 @@ Config load_config(const std::vector<std::string>& paths, const std::vector<std:
   config.control.arbiter.behaviour_count = static_cast<int>(behaviour_names.size());
   std::istringstream defaults(kDefaultConfig);
   read_document(TomlTable::parse(defaults, "built-in config/wasp.toml"), config, true);
-  for (const auto& path : paths) read_document(TomlTable::parse_file(path), config, false);
+  for (const auto& path : paths) override_config(TomlTable::parse_file(path), config);
   return config;
 }
+
+void override_config(TomlTable document, Config& config) { read_document(std::move(document), config, false); }
 
 }  // namespace wasp::scheduling

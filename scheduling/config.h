@@ -78,5 +78,7 @@ struct Config {
 /// `behaviour_names` are the behaviours this program has, in order; a section for any other is an error, and one
 /// without `enabled = true` in any file is not enabled. Throws ConfigError naming file, line and value.
 Config load_config(const std::vector<std::string>& paths, const std::vector<std::string>& behaviour_names);
+/// One document more over what load_config returned. Throws ConfigError naming file, line and value.
+void override_config(TomlTable document, Config& config);
 
 }  // namespace wasp::scheduling

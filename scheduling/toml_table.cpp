@@ -2,21 +2,23 @@
 
 #include <fmt/format.h>
 
+#include "drivers/toml_text.h"
+
 namespace wasp::scheduling {
 
 TomlTable TomlTable::parse_file(const std::string& path) {
   try {
-    return TomlTable(toml::parse(path));
+    return TomlTable(drivers::parse_toml_file(path));
   } catch (const std::exception& e) {
-    throw ConfigError("configuration '" + path + "': " + e.what());
+    throw ConfigError("configuration " + std::string(e.what()));
   }
 }
 
 TomlTable TomlTable::parse(std::istream& text, const std::string& name) {
   try {
-    return TomlTable(toml::parse(text, name));
+    return TomlTable(drivers::parse_toml(text, name));
   } catch (const std::exception& e) {
-    throw ConfigError("configuration '" + name + "': " + e.what());
+    throw ConfigError("configuration " + std::string(e.what()));
   }
 }
 

@@ -2,6 +2,7 @@
 // for are errors.
 #pragma once
 
+#include <cmath>
 #include <set>
 #include <stdexcept>
 #include <string>
@@ -36,9 +37,8 @@ class TomlTable {
       x = static_cast<double>(v->as_integer());
     else
       fail(*v, "must be a number");
-    if (std::is_integral_v<T> && x != static_cast<double>(static_cast<long long>(x)))
-      fail(*v, "must be a whole number");
     if (!(x >= low && x <= high)) fail(*v, "must lie in " + text(low) + " ... " + text(high));
+    if (std::is_integral_v<T> && x != std::floor(x)) fail(*v, "must be a whole number");
     out = static_cast<T>(x);
   }
   void flag(const char* key, bool& out);
@@ -56,6 +56,8 @@ class TomlTable {
   void merge(const TomlTable& later);
   /// Throws if the table holds a key nobody asked for.
   void finish() const;
+  /// For values that do not fit each other: throws naming where the table begins.
+  [[noreturn]] void refuse(const std::string& why) const { fail(value_, why); }
 
  private:
   static std::string text(double x);

@@ -1,6 +1,7 @@
 #include "shm/directory.h"
 
 #include <sys/mman.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cstring>
@@ -9,6 +10,8 @@
 
 namespace wasp::shm {
 namespace {
+
+constexpr std::uint64_t kLastMessage = std::uint64_t{1} << 62;  ///< no ring gets there; sequences count twice as fast
 
 std::uint64_t align(std::uint64_t n, std::uint64_t to) { return (n + to - 1) / to * to; }
 
@@ -66,6 +69,25 @@ bool possible(const TopicEntry& e, std::uint64_t file_bytes) {
          e.bytes == ring_bytes(e.slots, e.payload_bytes);
 }
 
+namespace {
+
+template <class T>
+bool read_at(const File& file, std::uint64_t offset, T& out) {
+  return pread(file.fd(), &out, sizeof out, static_cast<off_t>(offset)) == static_cast<ssize_t>(sizeof out);
+}
+
+/// At whatever step a writer died, the newest message of its ring is whole: else something else wrote here.
+bool newest_is_whole(const File& file, const TopicEntry& ring) {
+  std::uint64_t published = 0, sequence = 0;
+  if (!read_at(file, ring.offset, published)) return false;
+  if (published == 0) return true;
+  const std::uint64_t slot = (published - 1) % ring.slots * slot_stride(ring.payload_bytes);
+  return published < kLastMessage && read_at(file, ring.offset + sizeof(RingHeader) + slot, sequence) &&
+         sequence == 2 * published;
+}
+
+}  // namespace
+
 bool has_layout(const File& file, std::uint64_t total, std::uint64_t hash, const std::vector<TopicEntry>& entries) {
   if (static_cast<std::uint64_t>(file.status().st_size) != total) return false;
   void* base = mmap(nullptr, kPage, PROT_READ, MAP_SHARED, file.fd(), 0);
@@ -75,7 +97,9 @@ bool has_layout(const File& file, std::uint64_t total, std::uint64_t hash, const
                     h.layout_hash == hash && h.total_bytes == total && h.topic_count == entries.size() &&
                     std::memcmp(h.topics.data(), entries.data(), entries.size() * sizeof(TopicEntry)) == 0;
   munmap(base, kPage);
-  return same;
+  return same && std::all_of(entries.begin(), entries.end(), [&](const TopicEntry& e) {
+           return e.kind != TopicKind::kRing || newest_is_whole(file, e);
+         });
 }
 
 }  // namespace wasp::shm

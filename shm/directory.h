@@ -20,7 +20,8 @@ std::uint64_t hash_of(const std::vector<TopicEntry>& entries);
 /// True if the row lies inside a file of this size; no product is trusted to fit 64 bits.
 bool possible(const TopicEntry& entry, std::uint64_t file_bytes);
 
-/// True if the file is a finished region with exactly these rows: then its history can be kept.
+/// True if the file is a finished region with exactly these rows, and its rings are as a writer leaves them, however it
+/// died: then its history can be kept.
 bool has_layout(const File& file, std::uint64_t total, std::uint64_t hash, const std::vector<TopicEntry>& entries);
 
 }  // namespace wasp::shm

@@ -7,7 +7,8 @@
 #include <sstream>
 #include <stdexcept>
 #include <string_view>
-#include <toml.hpp>
+
+#include "drivers/toml_text.h"
 
 namespace wasp::sim {
 namespace {
@@ -199,12 +200,15 @@ const std::vector<Row>& rows() {
 }
 
 [[noreturn]] void fail(const std::string& name, const std::string& why) { throw std::runtime_error(name + ": " + why); }
+[[noreturn]] void fail(const std::string& name, const toml::value& value, const std::string& why) {
+  fail(name + ":" + std::to_string(value.location().line()), why);
+}
 
 double number_of(const toml::value& value, const std::string& name, const std::string& key) {
   if (value.is_boolean()) return value.as_boolean() ? 1 : 0;
   if (value.is_integer()) return static_cast<double>(value.as_integer());
   if (value.is_floating()) return value.as_floating();
-  fail(name, "'" + key + "' is neither a number nor true or false");
+  fail(name, value, "'" + key + "' is neither a number nor true or false");
 }
 
 /// Position of a text among the row's words.
@@ -215,7 +219,7 @@ double word_of(const toml::value& value, const Row& row, const std::string& name
     if (row.words[i] == word) return static_cast<double>(i);
     allowed += (i == 0 ? "\"" : ", \"") + row.words[i] + "\"";
   }
-  fail(name, "'" + key + "' is none of " + allowed);
+  fail(name, value, "'" + key + "' is none of " + allowed);
 }
 
 void apply(Draft& draft, const std::string& section, const std::string& key, const toml::value& value,
@@ -227,11 +231,11 @@ void apply(Draft& draft, const std::string& section, const std::string& key, con
     if (!(number >= r.low && number <= r.high)) {
       std::ostringstream why;
       why << "'" << full << "' is " << number << ", allowed are " << r.low << " ... " << r.high;
-      fail(name, why.str());
+      fail(name, value, why.str());
     }
     return r.set(draft, number);
   }
-  fail(name, "unknown key '" + full + "'");
+  fail(name, value, "unknown key '" + full + "'");
 }
 
 /// Largest share of the field at which the fisheye's radius still grows, 0 ... 1.
@@ -283,16 +287,11 @@ Scene generated_scene(const SimConfig& config) {
 
 SimConfig parse_sim_config(const std::string& toml_text, const std::string& name) {
   std::istringstream stream(toml_text);
-  toml::value document;
-  try {
-    document = toml::parse(stream, name);
-  } catch (const std::exception& error) {
-    fail(name, error.what());
-  }
+  const toml::value document = drivers::parse_toml(stream, name);
   Draft draft;
   for (const bool preset : {true, false})  // it sets what other keys then change
     for (const auto& [section, table] : document.as_table()) {
-      if (!table.is_table()) fail(name, "unknown key '" + section + "' outside any section");
+      if (!table.is_table()) fail(name, table, "unknown key '" + section + "' outside any section");
       for (const auto& [key, value] : table.as_table())
         if ((section == "vehicle" && key == "preset") == preset) apply(draft, section, key, value, name);
     }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "drivers/toml_text.h"
 #include "tools/program_paths.h"
 
 namespace wasp::tools {
@@ -10,8 +11,7 @@ namespace {
 std::vector<std::string> behaviour_names(const std::vector<std::string>& files) {
   std::vector<std::string> names;
   for (const auto& file : files) {
-    scheduling::TomlTable::parse_file(file);  // its errors name the file and the line
-    const toml::value root = toml::parse(file);
+    const toml::value root = drivers::parse_toml_file(file);
     if (!root.contains("behaviour")) continue;
     for (const auto& [name, section] : toml::find(root, "behaviour").as_table())
       if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);

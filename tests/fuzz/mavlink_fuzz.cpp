@@ -1,0 +1,173 @@
+// The MAVLink parser and the conversation above it. An input is either a byte stream as it is, or a script of frames
+// whose checksums are made right here, since a fuzzer never hits one: only so do payloads reach the conversation.
+// Promises: however a stream is cut into pieces, the same frames come out; each has its checksum by another
+// implementation; samples are finite and never of the future; what is answered is one good frame.
+#include <cmath>
+#include <vector>
+
+#include "drivers/autopilot_link.h"
+#include "tests/fuzz/bitwise_crc.h"
+#include "tests/fuzz/fuzz_input.h"
+
+namespace wasp {
+namespace {
+
+using fuzz::FuzzInput;
+using fuzz::require;
+
+struct Sink {
+  TimeNs received_at_ns = 0;
+  mavlink::Parser replies;
+
+  template <class Numbers>
+  static bool finite(const Numbers& numbers) noexcept {
+    for (const float x : numbers)
+      if (!std::isfinite(x)) return false;
+    return true;
+  }
+  void on_imu(const ImuSample& s) noexcept {
+    require(finite(s.accel_body_mps2) && finite(s.gyro_body_radps) && finite(s.mag_body_gauss) &&
+                std::isfinite(s.pressure_hpa) && std::isfinite(s.temperature_degc),
+            "IMU samples are finite");
+    require(s.exposed_at_ns <= received_at_ns, "no sample of the future");
+  }
+  void on_attitude(const AttitudeSample& s) noexcept {
+    require(finite(s.q_ned_body) && finite(s.rate_body_radps), "attitude samples are finite");
+    require(s.exposed_at_ns <= received_at_ns, "no sample of the future");
+  }
+  void on_heartbeat(const drivers::AutopilotStatus& s) noexcept {
+    require(s.received_at_ns == received_at_ns, "a heartbeat is of now");
+  }
+  void on_ack(std::uint16_t, std::uint8_t) noexcept {}
+  void on_statustext(std::uint8_t, std::string_view text) noexcept {
+    require(text.size() <= 50 && text.find('\0') == std::string_view::npos, "texts end where they end");
+  }
+  void reply(std::span<const std::uint8_t> frame) noexcept {
+    int good = 0;
+    replies.feed(frame, [&](const mavlink::Frame& f) noexcept { good += f.wire.size() == frame.size() ? 1 : 0; });
+    require(good == 1, "an answer is one good frame");
+  }
+};
+
+std::uint64_t mixed(std::uint64_t h, std::uint64_t value) { return (h ^ value) * 0x9E3779B97F4A7C15ull; }
+
+/// Lengths of the pieces a stream arrives in, 1 ... 64 bytes and sometimes far more.
+class Pieces {
+ public:
+  explicit Pieces(std::uint64_t seed) : state_(seed) {}
+  std::size_t next() {
+    state_ = mixed(state_, state_ >> 29) + 1;
+    return (state_ >> 40) % 8 == 0 ? 1500 : 1 + (state_ >> 48) % 64;
+  }
+
+ private:
+  std::uint64_t state_;
+};
+
+struct Accepted {
+  std::uint64_t count = 0, digest = 0;
+  bool operator==(const Accepted&) const = default;
+
+  void add(const mavlink::Frame& frame) {
+    const mavlink::MessageInfo* info = mavlink::find_message(frame.message_id);
+    require(info != nullptr && fuzz::is_whole_frame(frame.wire, info->crc_extra), "accepted frames have a checksum");
+    require(frame.payload + frame.length + 2 <= frame.wire.data() + frame.wire.size(), "a payload lies in its frame");
+    ++count;
+    for (const std::uint8_t byte : frame.wire) digest = mixed(digest, byte);
+  }
+};
+
+/// Feeds the stream in one go and in pieces; both must hand out the same.
+void check_stream(std::span<const std::uint8_t> stream, std::uint64_t seed) {
+  mavlink::Parser at_once, in_pieces;
+  Accepted first, second;
+  at_once.feed(stream, [&](const mavlink::Frame& f) noexcept { first.add(f); });
+  Pieces pieces(seed);
+  for (auto rest = stream; !rest.empty();) {
+    const std::size_t n = std::min(pieces.next(), rest.size());
+    in_pieces.feed(rest.first(n), [&](const mavlink::Frame& f) noexcept { second.add(f); });
+    rest = rest.subspan(n);
+  }
+  require(first == second, "pieces change nothing");
+  require(at_once.counts().bytes == stream.size() && at_once.counts().good == first.count, "counts are right");
+  require(at_once.counts().skipped_bytes <= stream.size(), "no byte is skipped twice");
+}
+
+std::uint64_t digest_of(std::span<const std::uint8_t> bytes) {
+  std::uint64_t h = 1;
+  for (const std::uint8_t byte : bytes) h = mixed(h, byte);
+  return h;
+}
+
+/// A frame of any known message with any payload, of the autopilot or of somebody else, and its checksum.
+void append_frame(FuzzInput& in, std::vector<std::uint8_t>& out) {
+  const auto how = in.take<std::uint8_t>();
+  const auto& info = mavlink::kMessages[in.take<std::uint8_t>() % mavlink::kMessages.size()];
+  const bool v1 = (how & 1) != 0 && info.id < 256, is_signed = !v1 && (how & 2) != 0;
+  const std::size_t length = v1 ? info.min_length : (how & 4) != 0 ? in.take<std::uint8_t>() : info.max_length;
+  const std::uint8_t system = (how & 8) != 0 ? in.take<std::uint8_t>() : std::uint8_t{1};
+  const std::uint8_t component = (how & 16) != 0 ? in.take<std::uint8_t>() : std::uint8_t{1};
+  const std::size_t start = out.size();
+  const auto put = [&out](std::size_t byte) { out.push_back(static_cast<std::uint8_t>(byte)); };
+  put(v1 ? 0xFE : 0xFD), put(length);
+  if (!v1) put(is_signed ? 1 : 0), put(0);
+  put(in.take<std::uint8_t>()), put(system), put(component), put(info.id & 0xFF);
+  if (!v1) put(info.id >> 8 & 0xFF), put(info.id >> 16);
+  const auto payload = in.take_bytes(length);
+  out.insert(out.end(), payload.begin(), payload.end());
+  out.resize(out.size() + length - payload.size());
+  std::uint16_t crc = 0xFFFF;
+  for (std::size_t i = start + 1; i < out.size(); ++i) crc = fuzz::bitwise_crc(crc, out[i]);
+  crc = fuzz::bitwise_crc(crc, info.crc_extra);
+  put(crc & 0xFF), put(crc >> 8);
+  if (is_signed) out.resize(out.size() + 13, 0x5A);
+}
+
+/// The link over a script of what arrives and what time does.
+void run_script(FuzzInput in, std::vector<std::uint8_t>& stream) {
+  drivers::AutopilotLink link;
+  Sink sink;
+  std::array<std::uint8_t, mavlink::kMaxFrame> question;
+  for (int steps = 0; !in.empty() && steps < 64; ++steps) {
+    const std::size_t before = stream.size();
+    switch (in.take<std::uint8_t>() % 6) {
+      case 0: {
+        const auto raw = in.take_bytes(in.take<std::uint8_t>());
+        stream.insert(stream.end(), raw.begin(), raw.end());
+        break;
+      }
+      case 1:
+        sink.received_at_ns += in.take<std::uint32_t>();
+        break;
+      case 2:
+        link.encode_timesync_request(sink.received_at_ns, question);
+        break;
+      case 3:
+        if (in.take<std::uint8_t>() == 0) link.restart();
+        break;
+      default:
+        append_frame(in, stream);
+    }
+    link.receive(std::span(stream).subspan(before), sink.received_at_ns, sink);
+  }
+  require(link.wire_counts().bytes == stream.size(), "the link saw every byte");
+}
+
+}  // namespace
+}  // namespace wasp
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  wasp::fuzz::FuzzInput in(data, size);
+  std::vector<std::uint8_t> stream;
+  if ((in.take<std::uint8_t>() & 1) != 0) {
+    wasp::run_script(in, stream);
+  } else {
+    const auto raw = in.rest();
+    stream.assign(raw.begin(), raw.end());
+    wasp::Sink sink{1, {}};
+    wasp::drivers::AutopilotLink link;
+    link.receive(stream, sink.received_at_ns, sink);
+  }
+  wasp::check_stream(stream, wasp::digest_of({data, size}));
+  return 0;
+}
