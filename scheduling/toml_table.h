@@ -56,8 +56,6 @@ class TomlTable {
   void merge(const TomlTable& later);
   /// Throws if the table holds a key nobody asked for.
   void finish() const;
-  /// For values that do not fit each other: throws naming where the table begins.
-  [[noreturn]] void refuse(const std::string& why) const { fail(value_, why); }
 
  private:
   static std::string text(double x);
