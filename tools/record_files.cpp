@@ -1,5 +1,7 @@
 // The files of a recording apart from its tables: the folder in TUM layout, camera.toml, stages.json, record.json.
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -29,6 +31,24 @@ void replace_file(const std::filesystem::path& path, const std::string& content)
     std::filesystem::remove(beside, error);
 }
 
+/// Room for the account, taken while there is some: a disk that fills up in flight must not keep the losses from being
+/// told.
+constexpr off_t kAccountRoom_bytes = 64 * 1024;
+
+std::filesystem::path reserve_path(const std::filesystem::path& path) { return path.string() + ".reserve"; }
+
+/// Writes `content` into the room reserved for `path` and gives the file its name.
+bool fill_reserve(const std::filesystem::path& path, const std::string& content) {
+  const int fd = open(reserve_path(path).c_str(), O_WRONLY | O_CLOEXEC);
+  if (fd < 0) return false;
+  const bool whole = write(fd, content.data(), content.size()) == static_cast<ssize_t>(content.size()) &&
+                     ftruncate(fd, static_cast<off_t>(content.size())) == 0;
+  close(fd);
+  std::error_code error;
+  if (whole) std::filesystem::rename(reserve_path(path), path, error);
+  return whole && !error;
+}
+
 std::string text_of(const nlohmann::json& document, int indent) {
   return document.dump(indent, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }
@@ -42,6 +62,13 @@ void link_table(const std::filesystem::path& log, const std::filesystem::path& r
 }
 
 }  // namespace
+
+void RecordSession::reserve_account() const {
+  const int fd = open(reserve_path(log("record.json")).c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+  if (fd < 0) return;
+  posix_fallocate(fd, 0, kAccountRoom_bytes);
+  close(fd);
+}
 
 void RecordSession::open_recording() {
   const auto recording = options_.directory / "recording";
@@ -93,15 +120,18 @@ void RecordSession::write_account(const std::string& reason) const {
                       {"kept", keeps(c)}});
   }
   for (const auto& e : events_) events.push_back({{"at_ns", e.at_ns}, {"region", e.region}, {"what", e.what}});
-  replace_file(log("record.json"), text_of({{"instance", options_.instance},
-                                            {"started_at_ns", started_at_ns_},
-                                            {"ended_at_ns", rt::now()},
-                                            {"reason", reason},
-                                            {"topics", topics},
-                                            {"lines_refused_by_disk", refused_lines()},
-                                            {"events", events},
-                                            {"events_dropped", events_dropped_}},
-                                           2));
+  const std::string account = text_of({{"instance", options_.instance},
+                                       {"started_at_ns", started_at_ns_},
+                                       {"ended_at_ns", rt::now()},
+                                       {"reason", reason},
+                                       {"topics", topics},
+                                       {"lines_refused_by_disk", refused_lines()},
+                                       {"events", events},
+                                       {"events_dropped", events_dropped_}},
+                                      2);
+  if (fill_reserve(log("record.json"), account)) return;
+  std::filesystem::remove(reserve_path(log("record.json")));
+  replace_file(log("record.json"), account);
 }
 
 }  // namespace wasp::tools

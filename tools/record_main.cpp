@@ -30,6 +30,8 @@ void report_losses(const wasp::tools::RecordSession& session) {
     if (c.lost + c.rejected > 0)
       fmt::print(stderr, "wasp-record: {}: {} lost, {} rejected of {}\n", key, c.lost, c.rejected,
                  c.taken + c.lost + c.rejected);
+  if (const auto refused = session.refused_lines(); refused > 0)
+    fmt::print(stderr, "wasp-record: the disk refused {} lines; the files hold whole lines only\n", refused);
 }
 
 }  // namespace
@@ -51,6 +53,7 @@ int main(int argc, char** argv) {
   options.poll_period_ns = static_cast<wasp::DurationNs>(poll_ms * 1e6);
 
   std::signal(SIGTERM, [](int) { stop_requested = true; });
+  std::signal(SIGXFSZ, SIG_IGN);  // a limit on file sizes is a full disk, not an end
   std::signal(SIGINT, [](int) { stop_requested = true; });
   wasp::tools::install_bus_guard();
   step_back();

@@ -58,6 +58,7 @@ struct RecordSession::Tables {
 
 RecordSession::RecordSession(RecordOptions options)
     : options_(std::move(options)), started_at_ns_(rt::now()), tables_(std::make_unique<Tables>(prepared(options_))) {
+  reserve_account();
   if (options_.frames) open_recording();
   const auto sink = [this](const std::string& region, const std::string& what) { note(region, what); };
   for (const auto& name : {shm::flight_region(options_.instance), shm::camera_region(options_.instance),

@@ -42,6 +42,8 @@ class RecordSession {
   void finish(const std::string& reason);
 
   [[nodiscard]] const std::map<std::string, TopicCount>& counts() const { return counts_; }
+  /// Lines that the disk refused.
+  [[nodiscard]] std::uint64_t refused_lines() const;
 
  private:
   struct Event {
@@ -66,10 +68,10 @@ class RecordSession {
   void note(const std::string& region, const std::string& what);
   void flush();
   void open_recording();
+  void reserve_account() const;
   void write_camera_toml() const;
   void write_stages() const;
   void write_account(const std::string& reason) const;
-  [[nodiscard]] std::uint64_t refused_lines() const;
   void watch_for_end(const Source& source);
   [[nodiscard]] std::filesystem::path log(const char* file) const { return options_.directory / "log" / file; }
 

@@ -204,6 +204,33 @@ TEST_F(Record, KilledRecorderLeavesWholeLinesAndAnUndisturbedWriter) {
   }
 }
 
+/// A limit on the size of files stands in for a full disk: writes beyond it fail, and the signal that comes with it
+/// must not end the recorder.
+TEST_F(Record, AFullDiskLosesLinesThatTheAccountCountsAndNothingElse) {
+  const std::string instance = test::unique_instance("full");
+  const std::string recorder_line =
+      test::program_path("wasp-record") + " --instance " + instance + " --out " + out_.string();
+  Program recorder({"/bin/sh", "-c", "ulimit -f 128; exec " + recorder_line});  // 64 KiB: blocks of 512 bytes
+  ASSERT_TRUE(eventually([&] { return fs::exists(out_ / "log/truth.csv"); }));
+  FakeFlight flight(instance);
+  std::uint32_t sent = 0;
+  const auto send_some = [&] {
+    for (int i = 0; i < 20; ++i, ++sent)
+      flight.ground->write(FakeFlight::make_cue(0, 1000 + sent, sent, 0.5), 2000 + sent);
+    std::this_thread::sleep_for(std::chrono::milliseconds(4));
+  };
+  while (sent < 2000) send_some();
+  flight.run->finished = 1;
+  ASSERT_EQ(recorder.wait(), 0);
+  const auto counted = account(out_);
+  const auto refused = counted.at("lines_refused_by_disk").get<std::uint64_t>();
+  const auto cues = topic(out_, "cue.ground_altitude");
+  EXPECT_GT(refused, 0u);
+  EXPECT_EQ(rows(out_ / "log/cues.csv") + refused, cues.at("recorded").get<std::uint64_t>());
+  EXPECT_EQ(cues.at("recorded").get<std::uint64_t>() + cues.at("lost").get<std::uint64_t>(), sent);
+  EXPECT_FALSE(fs::exists(out_ / "log/record.json.reserve"));
+}
+
 TEST_F(Record, TruncatedRegionIsAnEventNotACrash) {
   FakeFlight flight(test::unique_instance("truncated"));
   Program recorder(arguments(flight.instance, out_));
