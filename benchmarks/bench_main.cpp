@@ -22,7 +22,9 @@ constexpr Row kRows[] = {
      wasp::bench::run_render},
 #ifdef WASP_HAVE_BENCHMARK
     {"micro",
-     "histogram, seqlock, queue, ring, bell, MAVLink, control step, first touch: one operation each (Google Benchmark)",
+     "histogram, seqlock, queue, ring, bell, MAVLink, control step, fault points that are off, first touch: one "
+     "operation "
+     "each (Google Benchmark)",
      wasp::bench::run_micro},
 #endif
 #ifdef WASP_HAVE_OPENCV

@@ -6,9 +6,13 @@
 #include <sys/syscall.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
 #include <atomic>
+#include <cerrno>
 #include <climits>
 #include <cstdint>
+#include <span>
 
 #include "rt/clock.h"
 
@@ -20,6 +24,25 @@ inline void futex_wait_until(const std::atomic<std::uint32_t>* word, std::uint32
                              TimeNs deadline_ns) WASP_REALTIME {
   const timespec ts = to_timespec(deadline_ns);
   syscall(SYS_futex, word, FUTEX_WAIT_BITSET, expected, &ts, nullptr, FUTEX_BITSET_MATCH_ANY);
+}
+
+/// One of the words a thread waits on, and what it was.
+struct FutexWord {
+  const std::atomic<std::uint32_t>* word = nullptr;
+  std::uint32_t expected = 0;
+};
+
+/// As futex_wait_until on up to kMostFutexWords words at once, whichever changes first. A kernel before 5.16 cannot:
+/// there the thread looks every millisecond. Realtime-safe: yes (futex_waitv).
+inline constexpr std::size_t kMostFutexWords = 4;
+inline void futex_wait_any_until(std::span<const FutexWord> words, TimeNs deadline_ns) WASP_REALTIME {
+  std::array<futex_waitv, kMostFutexWords> waiters{};
+  const std::size_t count = std::min(words.size(), waiters.size());
+  for (std::size_t i = 0; i < count; ++i)
+    waiters[i] = {words[i].expected, reinterpret_cast<std::uintptr_t>(words[i].word), FUTEX_32, 0};
+  const timespec ts = to_timespec(deadline_ns);
+  if (count == 0 || (syscall(SYS_futex_waitv, waiters.data(), count, 0, &ts, CLOCK_MONOTONIC) < 0 && errno == ENOSYS))
+    sleep_until(std::min(deadline_ns, now() + kMillisecond));
 }
 
 /// Wakes every sleeper. Realtime-safe: yes (futex).
@@ -69,6 +92,21 @@ struct alignas(64) Bell {
       arrivals.fetch_add(1, std::memory_order_seq_cst);
       if (word.load(std::memory_order_seq_cst) == seen) futex_wait_until(&word, seen, deadline_ns);
       if (announced_elsewhere()) await_announced(ready, deadline_ns);
+    }
+  }
+  /// The same at several bells at once, woken by whichever rings; at most kMostFutexWords. Realtime-safe: yes if
+  /// `ready` is.
+  template <class Ready>
+  static bool wait_any(std::span<Bell* const> bells, Ready&& ready, TimeNs deadline_ns) WASP_REALTIME {
+    std::array<FutexWord, kMostFutexWords> seen{};
+    const std::size_t count = std::min(bells.size(), seen.size());
+    for (;;) {
+      for (std::size_t i = 0; i < count; ++i)
+        seen[i] = {&bells[i]->word, bells[i]->word.load(std::memory_order_seq_cst)};
+      if (ready()) return true;
+      if (now() >= deadline_ns) return false;
+      for (std::size_t i = 0; i < count; ++i) bells[i]->arrivals.fetch_add(1, std::memory_order_seq_cst);
+      futex_wait_any_until(std::span<const FutexWord>(seen.data(), count), deadline_ns);
     }
   }
 

@@ -16,6 +16,7 @@ namespace {
 
 constexpr long kAllowed[] = {
     SYS_futex,
+    SYS_futex_waitv,
     SYS_clock_nanosleep,
     SYS_clock_gettime,
     SYS_read,

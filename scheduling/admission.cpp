@@ -27,11 +27,11 @@ AnalysedThread analysed(const ThreadRow& row, DurationNs period_ns, DurationNs d
   return t;
 }
 
-std::vector<AnalysedThread> table_of(const Config& c, DurationNs frame_period_ns, bool with_replay) {
+std::vector<AnalysedThread> table_of(const Config& c, DurationNs frame_period_ns, bool with_camera) {
   std::vector<AnalysedThread> threads;
   threads.push_back(analysed(c.control_thread, c.control_period_ns, c.control_deadline_ns, c));
   threads.push_back(analysed(c.link_thread, c.link_period_ns, c.link_period_ns, c));
-  if (with_replay) threads.push_back(analysed(c.camera_thread, frame_period_ns, frame_period_ns, c));
+  if (with_camera) threads.push_back(analysed(c.camera_thread, frame_period_ns, frame_period_ns, c));
   const DurationNs down_period_ns = from_seconds(1.0 / c.camera_down.rate_hz);
   for (const auto& b : c.behaviours) {
     const DurationNs period_ns = b.looks_down ? down_period_ns : frame_period_ns;
@@ -80,8 +80,8 @@ MeasuredCosts read_measured_costs(const std::string& path) {
   return costs;
 }
 
-Plan make_plan(const Config& config, DurationNs frame_period_ns, bool with_replay, const MeasuredCosts& measured) {
-  std::vector<AnalysedThread> threads = table_of(config, frame_period_ns, with_replay);
+Plan make_plan(const Config& config, DurationNs frame_period_ns, bool with_camera, const MeasuredCosts& measured) {
+  std::vector<AnalysedThread> threads = table_of(config, frame_period_ns, with_camera);
   Plan plan;
   std::set<int> cores;
   for (auto& t : threads) {

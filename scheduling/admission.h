@@ -31,9 +31,9 @@ struct Plan {
   std::vector<std::string> reasons;  ///< why not, one line a thread
 };
 
-/// Enabled behaviours only. `frame_period_ns` is the front camera's; `with_replay` adds the replay camera's thread.
+/// Enabled behaviours only. `frame_period_ns` is the front camera's; `with_camera` adds a camera thread of this process: replay or relay.
 /// Cores are those this process may really use.
-Plan make_plan(const Config& config, DurationNs frame_period_ns, bool with_replay, const MeasuredCosts& measured);
+Plan make_plan(const Config& config, DurationNs frame_period_ns, bool with_camera, const MeasuredCosts& measured);
 
 /// Table, reasons and a picture of each core from the instant when all its threads are released together.
 std::string plan_text(const Plan& plan);

@@ -12,6 +12,7 @@
 #include "rt/process.h"
 #include "rt/thread.h"
 #include "scheduling/arming.h"
+#include "scheduling/camera_relay.h"
 #include "scheduling/control_faults.h"
 #include "scheduling/control_loop.h"
 #include "scheduling/fault_control.h"
@@ -111,8 +112,8 @@ class Flight {
     open_camera();
     arm_faults();
     wire();
-    admit(make_plan(config_, frame_period_ns_, replay_ != nullptr, measured_costs()), config_.admission, real_time_,
-          log);
+    admit(make_plan(config_, frame_period_ns_, replay_ != nullptr || relay_ != nullptr, measured_costs()),
+          config_.admission, real_time_, log);
     latency_hold_ = prepare_real_time(config_, real_time_, log);
     start_threads();
     control_.realtime_started = true;
@@ -169,6 +170,16 @@ class Flight {
     faults_ = std::make_unique<FaultControl>(setup, log);
     control_.faults = &faults_->board();
     control_.status->faults_armed = 1;
+    if (!replay_) insert_relay();
+  }
+
+  /// Between the camera and the behaviours, for the faults of the camera.
+  void insert_relay() {
+    relay_region_ = std::make_unique<shm::Region>(
+        shm::Region::create(shm::relay_region(options_.instance), CameraRelay::topics(*camera_)));
+    relay_files_.name = relay_region_->name();
+    relay_ = std::make_unique<CameraRelay>(*camera_, *relay_region_, stages_, relay_events_,
+                                           add_watch(config_.camera_thread));
   }
 
   /// Refuses a camera that does not offer what an enabled behaviour looks at.
@@ -215,7 +226,7 @@ class Flight {
   const ThreadWatch* wire_behaviour(std::size_t i) {
     const BehaviourRow& row = table_[i];
     BehaviourWiring w;
-    w.camera = camera_.get();
+    w.camera = relay_ ? relay_region_.get() : camera_.get();
     w.flight = &flight_;
     w.index = static_cast<std::uint32_t>(i);
     w.budget_ns = config_.behaviours[i].budget_ns;
@@ -267,6 +278,7 @@ class Flight {
     for (const auto& body : bodies_)
       threads_.emplace_back(spec(config_.behaviours[body.behaviour]), [this, &body] { body.run(control_); });
     threads_.emplace_back(spec(config_.link_thread), [this] { link_->run(control_); });
+    if (relay_) threads_.emplace_back(spec(config_.camera_thread), [this] { relay_->run(control_); });
     if (replay_) {
       threads_.emplace_back(spec(config_.camera_thread), [this] { replay_->run(control_); });
       rt::ThreadSpec decoder;
@@ -278,7 +290,7 @@ class Flight {
 
   void drain_events() {
     Event e;
-    for (EventQueue* queue : {&control_events_, &link_events_})
+    for (EventQueue* queue : {&control_events_, &link_events_, &relay_events_})
       while (queue->take(e)) log(e.text.data());
   }
 
@@ -297,7 +309,8 @@ class Flight {
     threads_.clear();
     supervisor_->look();
     drain_events();
-    if (const std::uint64_t lost = control_events_.dropped() + link_events_.dropped(); lost > 0)
+    if (const std::uint64_t lost = control_events_.dropped() + link_events_.dropped() + relay_events_.dropped();
+        lost > 0)
       log(std::to_string(lost) + " events were lost: their queue was full");
   }
 
@@ -307,7 +320,7 @@ class Flight {
   bool real_time_;
   std::optional<GuardPage> guard_;  ///< of a guarded flight
   shm::Region flight_;
-  RegionFiles flight_files_, camera_files_;  // a flight that never began leaves nothing behind
+  RegionFiles flight_files_, camera_files_, relay_files_;  // a flight that never began leaves nothing behind
   StageTable& stages_;
   WatchBoard board_;
   DurationNs frame_period_ns_ = 0;
@@ -320,12 +333,14 @@ class Flight {
   std::unique_ptr<ReplayCamera> replay_;
   std::unique_ptr<rt::CpuLatencyHold> latency_hold_;
   rt::Seqlock<LinkReport> report_;
-  EventQueue control_events_, link_events_;
+  EventQueue control_events_, link_events_, relay_events_;
   LoopControl control_;
   std::unique_ptr<LinkLoop> link_;
   std::unique_ptr<ControlLoop> control_loop_;
   std::unique_ptr<Supervisor> supervisor_;
   std::unique_ptr<FaultControl> faults_;  ///< null: no fault points exist
+  std::unique_ptr<shm::Region> relay_region_;
+  std::unique_ptr<CameraRelay> relay_;  ///< null: the behaviours read the camera's own frames
   std::vector<ThreadBody> bodies_;
   std::vector<rt::Thread> threads_;  // joined first
 };

@@ -101,9 +101,11 @@ class RingReader {
 
   /// Sleeps until a message newer than the last taken exists; false on time-out. Needs bells.
   bool wait(TimeNs deadline_ns) WASP_REALTIME {
-    if (bell_ == nullptr) return newest() > seen_;
-    return bell_->wait([this]() noexcept { return newest() > seen_; }, deadline_ns);
+    if (bell_ == nullptr) return unread();
+    return bell_->wait([this]() noexcept { return unread(); }, deadline_ns);
   }
+  /// True if a message newer than the last taken exists.
+  [[nodiscard]] bool unread() const WASP_REALTIME { return newest() > seen_; }
 
   /// The oldest unread message that is still intact; skipped ones are counted as lost. Empty if there is none.
   Sample next() WASP_REALTIME {

@@ -2,6 +2,8 @@
 //
 //   wasp.<instance>.camera   gray, depth, gray.down      written by whoever is the camera (simulator, replay, driver
 //                                                        process); the last one only where a camera looks down
+//   wasp.<instance>.relay    as .camera                  written by a flight process with fault points only: what its
+//                                                        behaviours see instead (scheduling/camera_relay.h)
 //   wasp.<instance>.flight   imu, attitude, flow, flow.down, cue.<behaviour>, command, stages, run
 //                                                        written by the flight process; a flow ring only where a
 //                                                        behaviour makes it, a cue ring for every enabled behaviour
@@ -14,6 +16,7 @@
 namespace wasp::shm {
 
 inline std::string camera_region(const std::string& instance) { return "wasp." + instance + ".camera"; }
+inline std::string relay_region(const std::string& instance) { return "wasp." + instance + ".relay"; }
 inline std::string flight_region(const std::string& instance) { return "wasp." + instance + ".flight"; }
 inline std::string truth_region(const std::string& instance) { return "wasp." + instance + ".truth"; }
 

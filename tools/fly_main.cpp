@@ -81,8 +81,8 @@ void fly_processes(Run& run, int& flight_code) {
   }
   recorder.end(SIGTERM, 60.0);
   sim.end(SIGTERM, 10.0);
-  for (const auto& region :
-       {shm::flight_region(run.instance), shm::camera_region(run.instance), shm::truth_region(run.instance)})
+  for (const auto& region : {shm::flight_region(run.instance), shm::camera_region(run.instance),
+                             shm::relay_region(run.instance), shm::truth_region(run.instance)})
     shm::Region::remove(region);
   fs::remove(run.folder / "tty");
 }

@@ -63,10 +63,20 @@ std::optional<int> parse_fly_options(int argc, char** argv, FlyOptions& o) {
   app.add_flag("--strict-syscalls", o.strict_syscalls,
                "a real-time thread that leaves its list of system calls ends the run");
   app.add_flag("!--no-safety-pilot", o.safety_pilot, "no simulated pilot who keeps the vehicle over its place");
+  app.add_option(
+         "--faults", o.fault_timeline,
+         "arm the fault points of the flight process: faults on the socket OUT/NAME/faults.sock and, if a FILE\n"
+         "is given, by its timeline (docs/faults.md)")
+      ->type_name("[FILE]")
+      ->expected(0, 1);
   app.add_flag("--json", o.json, "print results as JSON, one object a line");
   try {
     app.parse(argc, argv);
     if (o.name.empty()) o.name = default_name(o);
+    o.faults = app.count("--faults") > 0;
+    if (!o.fault_timeline.empty())
+      if (const std::string why = CLI::ExistingFile(o.fault_timeline); !why.empty())
+        throw CLI::ValidationError("--faults", why);
     if (!plain(o.name)) throw CLI::ValidationError("--name", "use letters, digits, '-' and '_', at most 60");
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? 0 : 2;

@@ -23,6 +23,8 @@ struct FlyOptions {
   bool strict_syscalls = false;
   bool json = false;
   bool safety_pilot = true;
+  bool faults = false;         ///< arm the fault points, with a control socket in the run's folder
+  std::string fault_timeline;  ///< and this timeline; empty: none
 };
 
 /// Parses; on --help or an error prints what is due and returns the exit code instead.

@@ -11,6 +11,7 @@
 #include "drivers/recording.h"
 #include "rt/clock.h"
 #include "scheduling/config.h"
+#include "scheduling/fault_socket.h"
 #include "scheduling/replay_camera.h"
 #include "sim/sim_config.h"
 #include "tools/camera_section.h"
@@ -119,10 +120,16 @@ Run plan_run(FlyOptions options) {
   if (fs::exists(run.folder / "run.json") || fs::exists(run.folder / "log/imu.csv"))
     throw std::runtime_error(run.folder.string() +
                              " holds an earlier run; choose another --name (nothing is overwritten)");
+  if (run.options.faults && fault_socket(run).string().size() > scheduling::FaultSocket::kLongestPath)
+    throw std::runtime_error(fmt::format("the path of a socket has at most {} bytes, {} has {}: choose a shorter --out",
+                                         scheduling::FaultSocket::kLongestPath, fault_socket(run).string(),
+                                         fault_socket(run).string().size()));
   if (!run.options.replay.empty()) plan_replay(run);
   fs::create_directories(run.folder / "log");
   return run;
 }
+
+std::filesystem::path fault_socket(const Run& run) { return run.folder / "faults.sock"; }
 
 void write_configuration(Run& run) {
   const auto sim = sim::load_sim_config((run.mission / "sim.toml").string());
@@ -157,6 +164,8 @@ std::vector<std::string> flight_arguments(const Run& run) {
   if (!run.real_time) a.push_back("--no-rt");
   if (!run.options.replay.empty())
     a.insert(a.end(), {"--replay", run.options.replay, "--seconds", fmt::format("{}", run.options.seconds)});
+  if (run.options.faults) a.insert(a.end(), {"--fault-socket", fault_socket(run).string()});
+  if (!run.options.fault_timeline.empty()) a.insert(a.end(), {"--faults", run.options.fault_timeline});
   return a;
 }
 

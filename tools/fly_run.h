@@ -33,6 +33,9 @@ void check_rights(Run& run);
 /// (for the recording).
 void write_configuration(Run& run);
 
+/// Where a flight with --faults listens.
+std::filesystem::path fault_socket(const Run& run);
+
 std::vector<std::string> flight_arguments(const Run& run);
 std::vector<std::string> sim_arguments(const Run& run);
 std::vector<std::string> recorder_arguments(const Run& run);

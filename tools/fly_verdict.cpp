@@ -45,6 +45,9 @@ nlohmann::json run_document(const Run& run, const std::vector<Phase>& phases, co
   const std::time_t now = std::time(nullptr);
   std::strftime(stamp, sizeof stamp, "%Y-%m-%dT%H:%M:%S%z", std::localtime(&now));
   doc["started"] = stamp;
+  if (run.options.faults)
+    doc["faults"] = "socket " + fault_socket(run).string() +
+                    (run.options.fault_timeline.empty() ? "" : ", timeline " + run.options.fault_timeline);
   for (const auto& p : phases)
     doc["phases"].push_back(
         {{"name", p.name}, {"setpoint_m", p.setpoint_m}, {"start_ns", p.start_ns}, {"end_ns", p.end_ns}});

@@ -94,6 +94,7 @@ RunSummary read_run(const shm::Region& flight) {
   s.commands_refused = run->commands_refused.load(kRelaxed);
   s.setpoints_flushed = run->setpoints_flushed.load(kRelaxed);
   s.behaviour_ticks = run->behaviour_ticks.load(kRelaxed);
+  s.faults_armed = run->faults_armed.load(kRelaxed) != 0;
   s.mission_result = run->mission_result.load(kRelaxed);
   const std::size_t n = std::min<std::size_t>(run->behaviour_count.load(kRelaxed), run->behaviours.size());
   for (std::size_t i = 0; i < n; ++i) {
@@ -121,6 +122,7 @@ nlohmann::json run_json(const RunSummary& s) {
           {"commands_refused", s.commands_refused},
           {"setpoints_flushed", s.setpoints_flushed},
           {"behaviour_ticks", s.behaviour_ticks},
+          {"faults_armed", s.faults_armed},
           {"mission_result", s.mission_result},
           {"behaviour_states", s.behaviour_states},
           {"behaviours", s.behaviours}};
@@ -160,6 +162,7 @@ RunSummary run_from_json(const nlohmann::json& document) {
   s.commands_refused = run.value("commands_refused", s.commands_refused);
   s.setpoints_flushed = run.value("setpoints_flushed", s.setpoints_flushed);
   s.behaviour_ticks = run.value("behaviour_ticks", s.behaviour_ticks);
+  s.faults_armed = run.value("faults_armed", false);
   s.mission_result = run.value("mission_result", s.mission_result);
   s.behaviour_states = run.value("behaviour_states", s.behaviour_states);
   s.behaviours = run.value("behaviours", s.behaviours);

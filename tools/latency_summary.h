@@ -30,6 +30,7 @@ struct RunSummary {
   std::uint64_t ticks = 0, skipped = 0, deadline_misses = 0, minor_faults = 0, major_faults = 0, frames_lost = 0;
   std::uint64_t bad_frames = 0, link_reconnects = 0;
   std::uint64_t incidents = 0, commands_refused = 0, setpoints_flushed = 0, behaviour_ticks = 0;
+  bool faults_armed = false;
   std::uint32_t mission_result = 0;             ///< scheduling::MissionResult
   std::vector<std::uint32_t> behaviour_states;  ///< scheduling::BehaviourState of each behaviour
   std::vector<std::string> behaviours;

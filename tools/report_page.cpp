@@ -55,6 +55,11 @@ void heading(const ReportData& data, Out out) {
         note.empty() ? "" : ": " + escape_html(note));
   if (!is_real_time)
     fmt::format_to(out, "<p class='banner'>It is not recorded whether this flight was real time.</p>\n");
+  if (data.status.faults_armed)
+    fmt::format_to(out,
+                   "<p class='banner'>FAULTS ARMED: fault points existed in this flight{}. What was thrown when is in "
+                   "log/flight.txt.</p>\n",
+                   text_at(data.run, "faults").empty() ? "" : ": " + escape_html(text_at(data.run, "faults")));
 }
 
 void facts(const ReportData& data, Out out) {

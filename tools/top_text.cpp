@@ -53,7 +53,8 @@ void add_flight(const TopSnapshot& s, Lines& lines) {
   if (!s.run.present) return;
   const RunSummary& r = s.run;
   lines.push_back(fmt::format(
-      "{}, mission {}   ticks {}   skipped {}   deadline misses {}   page faults {} minor {} major",
+      "{}{}, mission {}   ticks {}   skipped {}   deadline misses {}   page faults {} minor {} major",
+      r.faults_armed ? "FAULTS ARMED, " : "",
       r.finished ? "finished"
       : r.armed  ? "armed"
                  : "disarmed",

@@ -27,7 +27,8 @@ int* __errno_location() noexcept WASP_ASSUMED;
 int clock_nanosleep(clockid_t, int, const timespec*, timespec*) WASP_ASSUMED;
 int ppoll(pollfd*, nfds_t, const timespec*, const sigset_t*) WASP_ASSUMED;
 
-// Only SYS_futex is called by it: a wait with a deadline, or a wake. The system-call filter keeps it so at run time.
+// Only SYS_futex and SYS_futex_waitv are called by it: a wait with a deadline, or a wake. The system-call filter keeps it
+// so at run time.
 long syscall(long, ...) noexcept WASP_ASSUMED;
 
 // The serial line, opened O_NONBLOCK: these return EAGAIN instead of waiting; poll is called with no patience.

@@ -226,5 +226,123 @@ TEST_F(BehaviourLoopTest, ScriptSkipsFramesAndSuppliesAttitude) {
   EXPECT_EQ(done.load(), 3u);
 }
 
+/// The cue of a frame of grey level `value` while `point` is on.
+class BehaviourFaultsTest : public BehaviourLoopTest {
+ protected:
+  BehaviourFaultsTest() { control_.faults = &faults_; }
+  void set(FaultPoint point, float value, std::int32_t target = FaultBoard::kAnyTarget) {
+    faults_.set(point, 0, INT64_MAX, value, target);
+  }
+  void set(FaultPoint point) { set(point, row_of(point).value); }
+  Cue cue_of(std::uint32_t sequence, std::uint8_t value) {
+    shown_at_ns_ = rt::now();
+    publish_frame(sequence, value, shown_at_ns_);
+    return wait_for_cue();
+  }
+  FaultBoard faults_;
+  TimeNs shown_at_ns_ = 0;
+};
+
+TEST_F(BehaviourFaultsTest, ABoardWithNothingOnChangesNothing) {
+  with_loop(wiring(), [&] {
+    const Cue cue = cue_of(1, 40);
+    EXPECT_FLOAT_EQ(cue.body.height_m, 40.f);
+    EXPECT_EQ(cue.exposed_at_ns, shown_at_ns_);
+  });
+}
+
+TEST_F(BehaviourFaultsTest, SpinningTakesTheStepOverItsBudgetInRealTime) {
+  set(FaultPoint::kBehaviourSpin, 60);  // budget: 50 ms
+  with_loop(wiring(), [&] {
+    const Cue cue = cue_of(1, 40);
+    EXPECT_GE(cue.finished_at_ns - cue.started_at_ns, 60 * kMillisecond);
+    EXPECT_EQ(cue.over_budget, 1u);
+    faults_.clear(FaultPoint::kBehaviourSpin);
+    EXPECT_FLOAT_EQ(cue_of(2, 41).body.height_m, 41.f);
+  });
+}
+
+TEST_F(BehaviourFaultsTest, AnEndlessStepEndsWithItsFaultAndNotBefore) {
+  set(FaultPoint::kBehaviourEndless);
+  BehaviourWiring w = wiring();
+  with_loop(w, [&] {
+    publish_frame(1, 40, rt::now());
+    while (w.watch->busy_since_ns.load() == 0) rt::sleep_until(rt::now() + kMillisecond);
+    rt::sleep_until(rt::now() + 100 * kMillisecond);
+    EXPECT_NE(w.watch->busy_since_ns.load(), 0);
+    EXPECT_EQ(cues_.newest(), 0u);
+    faults_.clear(FaultPoint::kBehaviourEndless);
+    const Cue cue = wait_for_cue();
+    EXPECT_GE(cue.finished_at_ns - cue.started_at_ns, 100 * kMillisecond);
+  });
+}
+
+TEST_F(BehaviourFaultsTest, AnEndlessStepDoesNotHoldUpTheEndOfTheFlight) {
+  set(FaultPoint::kBehaviourEndless);
+  BehaviourWiring w = wiring();
+  with_loop(w, [&] {
+    publish_frame(1, 40, rt::now());
+    while (w.watch->busy_since_ns.load() == 0) rt::sleep_until(rt::now() + kMillisecond);
+  });
+}
+
+TEST_F(BehaviourFaultsTest, CuesAreNanOrHugeOrStuckUnderNewStamps) {
+  with_loop(wiring(), [&] {
+    set(FaultPoint::kBehaviourNanCue);
+    Cue cue = cue_of(1, 40);
+    EXPECT_TRUE(std::isnan(cue.body.height_m) && std::isnan(cue.body.climb_1ps) && std::isnan(cue.body.detail[7]));
+    EXPECT_EQ(cue.body.has_height, 1);
+    EXPECT_EQ(cue.body.validity, Validity::kValid);
+    faults_.clear(FaultPoint::kBehaviourNanCue);
+    set(FaultPoint::kBehaviourHugeCue, -1e30f);
+    EXPECT_FLOAT_EQ(cue_of(2, 40).body.height_m, -1e30f);
+    faults_.clear(FaultPoint::kBehaviourHugeCue);
+    set(FaultPoint::kBehaviourStuckCue);
+    EXPECT_FLOAT_EQ(cue_of(3, 50).body.height_m, 50.f);
+    cue = cue_of(4, 60);
+    EXPECT_FLOAT_EQ(cue.body.height_m, 50.f);
+    EXPECT_EQ(cue.exposed_at_ns, shown_at_ns_);
+    EXPECT_EQ(cue.frame_sequence, 4u);
+    faults_.clear(FaultPoint::kBehaviourStuckCue);
+    EXPECT_FLOAT_EQ(cue_of(5, 70).body.height_m, 70.f);
+  });
+}
+
+TEST_F(BehaviourFaultsTest, InputsAreDenormalOrNan) {
+  AttitudeSample level;
+  level.exposed_at_ns = rt::now();
+  attitude_.write(level, rt::now());
+  with_loop(wiring(), [&] {
+    set(FaultPoint::kBehaviourDenormal, 0);
+    EXPECT_EQ(std::fpclassify(cue_of(1, 40).body.detail[0]), FP_SUBNORMAL);
+    set(FaultPoint::kBehaviourDenormal, 1);
+    EXPECT_TRUE(std::isnan(cue_of(2, 40).body.detail[0]));
+  });
+}
+
+TEST_F(BehaviourFaultsTest, CuesOfTheFutureAndNoCues) {
+  with_loop(wiring(), [&] {
+    set(FaultPoint::kBehaviourFutureCue, 300);
+    const Cue cue = cue_of(1, 40);
+    EXPECT_EQ(cue.exposed_at_ns, shown_at_ns_ + 300 * kMillisecond);
+    faults_.clear(FaultPoint::kBehaviourFutureCue);
+    set(FaultPoint::kBehaviourSilent);
+    const Stage& compute = stage_table(flight_).stages[1];
+    publish_frame(2, 50, rt::now());
+    while (compute.histogram.count() < 2) rt::sleep_until(rt::now() + kMillisecond);  // it has stepped
+    faults_.clear(FaultPoint::kBehaviourSilent);
+    EXPECT_EQ(cue_of(3, 60).frame_sequence, 3u);  // and the cue in between was kept back
+  });
+}
+
+TEST_F(BehaviourFaultsTest, AFaultAimedAtAnotherBehaviourIsNotMet) {
+  set(FaultPoint::kBehaviourNanCue, 0, 7);
+  with_loop(wiring(), [&] {
+    EXPECT_FLOAT_EQ(cue_of(1, 40).body.height_m, 40.f);
+    set(FaultPoint::kBehaviourNanCue, 0, 0);
+    EXPECT_TRUE(std::isnan(cue_of(2, 40).body.height_m));
+  });
+}
+
 }  // namespace
 }  // namespace wasp::scheduling
