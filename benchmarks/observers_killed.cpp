@@ -22,7 +22,6 @@ namespace wasp::bench {
 namespace {
 
 constexpr std::size_t kKept = 1 << 19;  ///< times of a block; later ones are left out
-constexpr int kObservers = 3;
 
 /// A ring, and how many ticks of the writer pass between its messages. Ten of the flight's, two of the camera's.
 struct Topic {
@@ -42,6 +41,7 @@ constexpr std::array<Topic, 8> kTopics = {{{false, shm::kImu, 1},
 /// Between parent, writer and observers.
 struct Shared {
   std::atomic<std::uint32_t> ready, stop;
+  bool careful;
   std::atomic<std::uint64_t> accepted, dropped, torn, backwards;
   std::atomic<std::size_t> messages, frames, ticks;
   std::array<std::int64_t, kKept> message_ns, frame_ns, late_ns;
@@ -111,23 +111,26 @@ int write_until_told(const std::string& instance, DurationNs tick_ns, Shared& sh
   return 0;
 }
 
+/// Woken by the bell of the grey image; looks now and then; or takes the oldest there is, under the writer's pen.
+enum class Habit { kSleeps, kLooks, kLooksBack };
+constexpr std::array kHabits = {Habit::kSleeps, Habit::kLooks, Habit::kLooksBack};
+
 /// Copies every message it can get of every ring, as a recorder does, and judges what it accepted.
 class Observer {
  public:
   Observer(const std::string& instance, bool with_bells, Shared& shared)
       : regions_(Regions::attach(instance, with_bells)), shared_(shared) {
-    for (const Topic& topic : kTopics) {
-      readers_.emplace_back(regions_.of(topic), topic.name);
-      readers_.back().rewind();
-    }
+    for (const Topic& topic : kTopics) readers_.emplace_back(regions_.of(topic), topic.name);
     copy_.resize(kFramePixelOffset + 2 * kPixels);
   }
-  [[noreturn]] void observe(bool sleeps) {
+  [[noreturn]] void observe(Habit habit) {
     for (;;) {
-      for (std::size_t t = 0; t < readers_.size(); ++t)
+      for (std::size_t t = 0; t < readers_.size(); ++t) {
+        if (habit == Habit::kLooksBack) readers_[t].rewind(), last_[t] = 0;
         for (int i = 0; i < 8 && take(t); ++i) {
         }
-      if (sleeps)
+      }
+      if (habit == Habit::kSleeps)
         readers_.back().wait(rt::now() + 50 * kMillisecond);
       else
         rt::sleep_until(rt::now() + kMillisecond / 2);
@@ -142,7 +145,7 @@ class Observer {
     const std::size_t words = reader.payload_bytes() / 8;
     const auto* from = reinterpret_cast<const std::uint64_t*>(sample.data);
     for (std::size_t i = 0; i < words; ++i) copy_[i] = __atomic_load_n(from + i, __ATOMIC_RELAXED);
-    if (!reader.intact(sample)) {
+    if (shared_.careful && !reader.intact(sample)) {
       reader.count_lost();
       shared_.dropped.fetch_add(1, std::memory_order_relaxed);
       return true;
@@ -164,15 +167,23 @@ class Observer {
   std::array<std::uint64_t, kTopics.size()> last_{};
 };
 
-[[noreturn]] void stand_by() {
-  for (;;) rt::sleep_until(rt::now() + kMillisecond / 2);
+/// As much work as an observer's, on memory of its own.
+[[noreturn]] void stand_by(const std::string& instance) {
+  const Regions regions = Regions::attach(instance, false);
+  const std::vector<std::uint64_t> own(kFramePixelOffset + 2 * kPixels, 1);
+  std::vector<std::uint64_t> copy(own.size());
+  for (;;) {
+    for (std::size_t i = 0; i < own.size() / 8; ++i) copy[i] = __atomic_load_n(&own[i], __ATOMIC_RELAXED);
+    rt::sleep_until(rt::now() + kMillisecond);
+  }
 }
 
 void append(std::vector<std::int64_t>& to, const std::array<std::int64_t, kKept>& from, std::size_t count) {
   to.insert(to.end(), from.begin(), from.begin() + static_cast<std::ptrdiff_t>(count));
 }
 
-/// One writer's life, three observers, three bystanders; those of one kind are tormented until so many have died.
+/// One writer's life, an observer of each habit, as many bystanders; those of one kind are tormented until so many have
+/// died.
 bool run_block(const std::string& instance, const KillOptions& options, bool torment_observers, unsigned seed,
                std::uint64_t kills, Shared& shared, Torments& torments, WriterTimes& times) {
   const Placement placement = choose_placement();
@@ -186,21 +197,21 @@ bool run_block(const std::string& instance, const KillOptions& options, bool tor
   {
     Torments of_the_others;
     std::deque<Tormentor> observers, bystanders;
-    for (int i = 0; i < kObservers; ++i) {
-      const bool sleeps = i == 0;
+    for (const Habit habit : kHabits) {
+      const unsigned own_seed = seed * 8 + static_cast<unsigned>(habit);
       observers.emplace_back(
-          [&, sleeps] {
+          [&, habit] {
             return start(placement.reader_core, false,
-                         [&]() -> int { Observer(instance, sleeps, shared).observe(sleeps); });
+                         [&]() -> int { Observer(instance, habit == Habit::kSleeps, shared).observe(habit); });
           },
-          seed * 8 + static_cast<unsigned>(i), torment_observers ? torments : of_the_others);
-      bystanders.emplace_back([&] { return start(placement.reader_core, false, []() -> int { stand_by(); }); },
-                              seed * 8 + 4 + static_cast<unsigned>(i), torment_observers ? of_the_others : torments);
+          own_seed, torment_observers ? torments : of_the_others);
+      bystanders.emplace_back([&] { return start(placement.reader_core, false, [&]() -> int { stand_by(instance); }); },
+                              own_seed + 4, torment_observers ? of_the_others : torments);
     }
     std::mt19937 random(seed);
     while (torments.deaths < enough && !interrupted()) {
       rt::sleep_until(rt::now() + static_cast<DurationNs>(random() % 4000) * kMicrosecond);
-      (torment_observers ? observers : bystanders)[random() % kObservers].act();
+      (torment_observers ? observers : bystanders)[random() % kHabits.size()].act();
     }
   }
   shared.stop = 1;
@@ -232,6 +243,7 @@ KillResult torment_observers(const KillOptions& options) {
   if (shared == nullptr) return result.trouble = "no shared memory", result;
   const std::string instance = "observed." + std::to_string(getpid());
   Torments torments, nobody;
+  shared->careful = options.careful;
   unsigned seed = 0;
   while (torments.deaths < options.kills && result.trouble.empty()) {
     const std::uint64_t kills = std::min(options.kills - torments.deaths, options.kills_a_block);

@@ -20,5 +20,11 @@ TEST(ObserversKilled, NothingTornIsAcceptedAndNoSlotIsLeaked) {
   EXPECT_FALSE(result.tormented.frame_ns.empty());
 }
 
+TEST(ObserversKilled, TheSameCheckCatchesObserversThatDoNotLookAgain) {
+  std::uint64_t torn = 0;
+  for (int round = 0; round < 20 && torn == 0; ++round) torn = torment_observers({.kills = 120, .careful = false}).torn;
+  EXPECT_GT(torn, 0u);
+}
+
 }  // namespace
 }  // namespace wasp::bench
