@@ -16,6 +16,9 @@ struct Row {
 constexpr Row kRows[] = {
     {"ipc", "a camera frame from process to process, beside iceoryx, pipe, futex, eventfd; observers; killed readers",
      wasp::bench::run_ipc},
+    {"observers",
+     "observers of a flight and a camera killed and frozen by the thousand: torn reads, leaked slots, timing",
+     wasp::bench::run_observers},
     {"bridge", "control timing with and without the iceoryx gateway, killed and frozen at random beside the flight",
      wasp::bench::run_bridge},
     {"render", "frames of the simulated camera: worlds, sizes, lenses, antialiasing, defocus, motion blur",
@@ -44,6 +47,9 @@ int main(int argc, char** argv) {
     CLI::App* command = app.add_subcommand(row.name, row.help);
     command->add_flag("--json", options.json, "one JSON object a line");
     command->add_option("--seconds", options.seconds, "about how long to measure")->check(CLI::Range(1.0, 3600.0));
+    if (row.name == std::string_view("observers"))
+      command->add_option("--kills", options.kills, "how many observers die; some 30 ms each")
+          ->check(CLI::Range(1, 1'000'000));
     if (row.name == std::string_view("vision") || row.name == std::string_view("render"))
       command->add_option("--only", options.only, "only rows whose name contains this");
     command->callback([&chosen, &row] { chosen = &row; });

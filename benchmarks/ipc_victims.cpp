@@ -1,13 +1,11 @@
 #include "benchmarks/ipc_victims.h"
 
-#include <signal.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <functional>
-#include <random>
 #include <string>
 
+#include "benchmarks/tormentor.h"
 #include "shm/broadcast_ring.h"
 
 namespace wasp::bench {
@@ -61,38 +59,7 @@ int be_the_witness(const std::string& name, Run& run) {
 struct Pool {
   std::vector<std::int64_t> publish_ns, frame_ns;
   std::uint64_t read = 0, lost = 0;
-  int deaths = 0, freezes = 0;
-};
-
-/// Holds a process, and does one random act on it when asked.
-class Tormentor {
- public:
-  Tormentor(std::function<pid_t()> raise, unsigned seed, Pool& pool)
-      : raise_(std::move(raise)), random_(seed), pool_(pool), pid_(raise_()) {}
-  ~Tormentor() { end(); }
-  Tormentor(const Tormentor&) = delete;
-  Tormentor& operator=(const Tormentor&) = delete;
-  void act() {
-    const auto what = random_() % 4;
-    if (what == 0) {
-      end();
-      pid_ = raise_();
-      ++pool_.deaths;
-    } else {
-      kill(pid_, what == 1 ? SIGSTOP : SIGCONT);
-      pool_.freezes += what == 1 ? 1 : 0;
-    }
-  }
-
- private:
-  void end() {
-    kill(pid_, SIGKILL);
-    waitpid(pid_, nullptr, 0);
-  }
-  std::function<pid_t()> raise_;
-  std::mt19937 random_;
-  Pool& pool_;
-  pid_t pid_;
+  Torments torments;
 };
 
 bool one_block(const Placement& placement, Run& run, Victim victim, unsigned seed, Pool& pool) {
@@ -109,9 +76,9 @@ bool one_block(const Placement& placement, Run& run, Victim victim, unsigned see
     const std::function<pid_t()> aside = [&] {
       return start(placement.reader_core, false, [&]() -> int { stand_by(run); });
     };
-    Pool nothing_done;
+    Torments nothing_done;
     const Tormentor spared(victim == Victim::kReader ? aside : along, seed, nothing_done);
-    Tormentor tormented(victim == Victim::kReader ? along : aside, seed, pool);
+    Tormentor tormented(victim == Victim::kReader ? along : aside, seed, pool.torments);
     const TimeNs limit = rt::now() + from_seconds(30 + 4 * run.frames * to_seconds(run.period_ns));
     while (run.finished.load() == 0 && rt::now() < limit && !interrupted()) {
       rt::sleep_until(rt::now() + 5 * kMillisecond);
@@ -144,7 +111,8 @@ void measure_victims(Report& report, const Placement& placement, Run& run, doubl
   const auto ratio = [&](auto member, double Quantiles::*q) {
     return quantiles(reader.*member).*q / quantiles(bystander.*member).*q;
   };
-  const std::string acts = std::to_string(reader.deaths) + " killed, " + std::to_string(reader.freezes) + " frozen";
+  const std::string acts =
+      std::to_string(reader.torments.deaths) + " killed, " + std::to_string(reader.torments.freezes) + " frozen";
   report.bar("victims.frame.ratio.p50", ratio(&Pool::frame_ns, &Quantiles::p50), "1", 1.05, acts);
   report.figure("victims.frame.ratio.p99", ratio(&Pool::frame_ns, &Quantiles::p99), "1");
   report.figure("victims.publish.ratio.p50", ratio(&Pool::publish_ns, &Quantiles::p50), "1");

@@ -1,7 +1,8 @@
 // Finds frames in a byte stream. A start byte is a claim; the header refutes most false ones at once (unknown id,
 // source 0, impossible version 1 length), the checksum the rest, and the search goes on at the byte after the failed
-// start, so a damaged frame never hides the good one behind it. A frame that cannot be verified (unknown id) is passed
-// over whole only if it stood where a frame was due and the next header in sequence follows it: frames inside its
+// start, so a damaged frame never hides the good one behind it. (One exception: a signed frame that lost bytes of its
+// signature, which no checksum covers, takes them from its neighbour.) A frame that cannot be verified (unknown id) is
+// passed over whole only if it stood where a frame was due and the next header in sequence follows it: frames inside its
 // payload are not ours.
 #pragma once
 

@@ -30,6 +30,8 @@
 #include "sim/vrml_exposure.h"
 #include "sim/vrml_file.h"
 #include "sim/vrml_motion.h"
+#include "sim/vrml_shapes.h"
+#include "sim/vrml_text.h"
 
 namespace wasp::sim {
 namespace {
@@ -293,11 +295,13 @@ void note_error(const SoError* error, void*) {
 /// Coin's root of the file, referenced; the caller unrefs.
 SoVRMLGroup* parse(const fs::path& file) {
   read_errors.clear();
+  const std::string text = read_vrml_text(file);
   SoInput in;
-  if (!fs::is_regular_file(file) || !in.openFile(file.c_str(), TRUE))
-    throw std::runtime_error(file.string() + ": cannot be read");
+  in.setBuffer(text.data(), text.size());
   if (!in.isFileVRML2()) throw std::runtime_error(file.string() + ":1: not VRML97 (\"#VRML V2.0 utf8\")");
+  SoInput::addDirectoryFirst(file.parent_path().c_str());  // where the pictures are, which Coin looks for
   SoVRMLGroup* root = SoDB::readAllVRML(&in);
+  SoInput::removeDirectory(file.parent_path().c_str());
   if (root == nullptr || !read_errors.empty())
     throw std::runtime_error(file.string() + ": " + (read_errors.empty() ? "not valid VRML97" : read_errors));
   root->ref();
@@ -332,8 +336,10 @@ void read_head(SoVRMLGroup& root, Scene& scene, bool& baked) {
   }
 }
 
+/// Of a graph that is safe to walk; else it is let go.
 VrmlMotions motions_of(SoVRMLGroup& root, const fs::path& file) {
   try {
+    check_shapes(root);
     return take_motions(root);
   } catch (const std::exception& e) {
     root.unref();
@@ -351,10 +357,10 @@ Scene read_vrml(const fs::path& file) {
   SoDebugError::setHandlerCallback([](const SoError*, void*) {}, nullptr);
   SoVRMLImageTexture::setDelayFetchURL(TRUE);  // pictures are read here, not by Coin
   SoVRMLGroup* root = parse(file);
+  const VrmlMotions motions = motions_of(*root, file);
   Scene scene;
   bool baked = false;
   read_head(*root, scene, baked);
-  const VrmlMotions motions = motions_of(*root, file);
   Builder builder(file, baked, motions);
   SoCallbackAction action;
   action.addPreCallback(SoVRMLAppearance::getClassTypeId(), &Builder::on_appearance, &builder);

@@ -1,7 +1,9 @@
 #include "drivers/image_file.h"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 #include <unistd.h>
+#include <zlib.h>
 
 #include <filesystem>
 #include <fstream>
@@ -94,6 +96,30 @@ TEST_F(ImageFile, EveryErrorNamesTheFile) {
             }).find("x.png"),
             std::string::npos);
   EXPECT_NE(error_of([&] { save_png(folder / "y.png", GrayView{}); }).find("y.png"), std::string::npos);
+}
+
+TEST_F(ImageFile, WhatAHeaderClaimsIsNotAllocatedBeforeTheFileCanHoldIt) {
+  write("huge.pgm", "P5 16384 16384 65535\nab");
+  EXPECT_NE(error_of([&] { load_gray16(folder / "huge.pgm"); }).find("smaller than its image"), std::string::npos);
+  const auto gray = noise<std::uint8_t>(64 * 40);
+  save_png(folder / "g.png", GrayView{gray.data(), 64, 40, 64}, 9);
+  std::ifstream in(folder / "g.png", std::ios::binary);
+  std::string bytes((std::istreambuf_iterator<char>(in)), {});
+  const std::string head("IHDR\0\0\x40\0\0\0\x40\0\x08\0\0\0\0", 17);  // 16384 x 16384, 8 bits
+  const auto crc = crc32(0, reinterpret_cast<const Bytef*>(head.data()), static_cast<uInt>(head.size()));
+  bytes.replace(12, head.size(), head);
+  for (std::size_t i = 0; i < 4; ++i) bytes[29 + i] = static_cast<char>(crc >> (24 - 8 * i));
+  write("huge.png", bytes);
+  EXPECT_EQ(probe_image(folder / "huge.png").width_px, 16384);
+  EXPECT_NE(error_of([&] { load_gray8(folder / "huge.png"); }).find("smaller than its image"), std::string::npos);
+}
+
+TEST_F(ImageFile, APipeIsRefusedInsteadOfWaitedFor) {
+  for (const char* name : {"pipe.png", "pipe.pgm"}) {
+    ASSERT_EQ(mkfifo((folder / name).c_str(), 0600), 0);
+    EXPECT_NE(error_of([&] { load_gray8(folder / name); }).find("not a regular file"), std::string::npos) << name;
+    EXPECT_NE(error_of([&] { probe_image(folder / name); }).find("not a regular file"), std::string::npos) << name;
+  }
 }
 
 TEST_F(ImageFile, EveryTruncationOfAPngIsAnErrorNotACrash) {

@@ -124,6 +124,26 @@ TEST_F(RecordingFolder, ErrorsSayWhatIsWrong) {
   EXPECT_THROW(Recording::open(folder / "depth.txt"), std::runtime_error);
 }
 
+TEST_F(RecordingFolder, TimesThatDoNotFitAreProblemsNotOverflows) {
+  depth("depth/a.png", 1);
+  depth("depth/b.png", 2);
+  text("depth.txt",
+       "-1.0 depth/a.png\n-9223372036.854775807 depth/a.png\n9223372036.854775807 depth/a.png\n7.0 depth/b.png\n");
+  const Recording recording = Recording::open(folder);
+  EXPECT_EQ(recording.entries().size(), 1u);
+  EXPECT_EQ(recording.problems().size(), 3u);
+  fs::remove(folder / "depth.txt");
+  gray("9999999999999999999.png", 1);
+  gray("1403636579763555584.png", 1);
+  const Recording named = Recording::open(folder);
+  EXPECT_EQ(named.layout(), "asl");
+  EXPECT_EQ(named.entries().size(), 1u);
+  EXPECT_EQ(named.problems().size(), 1u);
+  gray("test1.png", 1);
+  text("gt_per_frame.csv", "frame,t_s\n1,1e300\n");
+  EXPECT_NE(Recording::open(folder).problems().at(0).find("gt_per_frame.csv:2"), std::string::npos);
+}
+
 TEST_F(RecordingFolder, KnowsLayoutsByTheirContents) {
   depth("frame-000010.depth.png", 1000);
   depth("frame-000012.depth.png", 1000);

@@ -170,6 +170,19 @@ TEST_F(ConfigTest, WrongTypesAndBrokenSyntax) {
   EXPECT_FALSE(error_of("[control\n").empty());
 }
 
+TEST_F(ConfigTest, NumbersThatFitNoIntegerAreOutOfRange) {
+  for (const char* number : {"1e300", "-1e300", "nan", "inf", "-inf"})
+    EXPECT_NE(error_of("[camera]\nwidth_px = " + std::string(number) + "\n").find("must lie in"), std::string::npos)
+        << number;
+}
+
+TEST_F(ConfigTest, ValuesThatDoNotFitEachOtherNameFileAndLine) {
+  for (const char* text :
+       {"\n[camera]\nposition_body_m = [1, 2]\n", "\n[mission]\nheights_m = [1.0, 2.0]\nseconds = [3]\n",
+        "\n[control]\nmin_height_m = 5\nmax_height_m = 4\n", "\n[control]\nmass_kg = 50\nfull_thrust_n = 1\n"})
+    EXPECT_NE(error_of(text).find(".toml:2"), std::string::npos) << text << error_of(text);
+}
+
 TEST_F(ConfigTest, AMissingFileIsNamed) {
   try {
     load_config({"/nowhere/wasp.toml"}, kNames);

@@ -136,6 +136,25 @@ TEST_F(Corruption, RingsSpoiledUnderAValidDirectory) {
   }
 }
 
+TEST_F(Corruption, ARingThatNoWriterLeavesSoIsNotTakenOver) {
+  const std::vector<TopicSpec> specs{{"a", "T", TopicKind::kRing, 3, 128}, {"b", "U", TopicKind::kBlock, 1, 192}};
+  put(bytes_);
+  EXPECT_EQ(RingWriter(Region::create(name_, specs), "a").published(), 5u) << "history stays";
+  for (const std::uint64_t published :
+       {UINT64_MAX, UINT64_MAX / 2 + 1, std::uint64_t{6}, std::uint64_t{4}, std::uint64_t{1}}) {
+    auto spoiled = bytes_;
+    std::memcpy(spoiled.data() + kPage, &published, sizeof published);
+    put(spoiled);
+    // Message 4 is whole too: an older number is only history lost.
+    const Region successor = Region::create(name_, specs);
+    EXPECT_EQ(RingWriter(successor, "a").published(), published == 4 ? 4u : 0u) << published;
+    ASSERT_TRUE(RingWriter(successor, "a").write(std::array<std::uint64_t, 16>{7}, 1));
+    std::array<std::uint64_t, 16> value{};
+    EXPECT_TRUE(RingReader(successor, "a").copy_newest(value));
+    EXPECT_EQ(value[0], 7u);
+  }
+}
+
 TEST_F(Corruption, ExtentThatOverflows64BitsIsRefused) {
   // A file of 2^46 bytes, all hole but its first page, whose row has slots * stride = 2^64: the product is 0 to a
   // program that does not look, and the second slot lies outside the mapping.

@@ -1,8 +1,7 @@
-// Writers and readers that die or stop at any instant. One test kills a writer after each single instruction of loan,
-// write and publish (ptrace); one at random instants, start-up included, hundreds of times, under the eyes of readers
-// in another process; one does the same to readers while the writer must go on.
+// Writers and readers that die or stop at any instant. One test kills a writer at random instants, start-up included,
+// hundreds of times, under the eyes of readers in another process; one does the same to readers while the writer must
+// go on. stepping_test.cpp kills at every single step instead.
 #include <sys/mman.h>
-#include <sys/ptrace.h>
 
 #include <atomic>
 #include <random>
@@ -86,69 +85,6 @@ TEST_F(Crash, WriterKilledAtRandomInstantsNeverMisleadsAReader) {
   const Region region = Region::create(name_, one_ring(4));
   EXPECT_GT(region.header().writer_restarts.load(), 10u);
   RecordProperty("published", std::to_string(newest));
-}
-
-/// Small, so that one publish is a few hundred instructions.
-using Small = std::array<std::uint64_t, 8>;
-
-/// A traced child that takes over the ring, stops, publishes one value, and stops again. Steps it `steps` instructions
-/// from the first stop and kills it there. Returns 1 if it came to the second stop before that, -1 if tracing is
-/// refused.
-int publish_and_die_after(const std::string& name, std::uint64_t steps) {
-  const pid_t child = test::start_child([&] {
-    const Region region = Region::create(name, one_ring(3, sizeof(Small)));
-    RingWriter writer(region, "data");
-    const std::uint64_t n = writer.published() + 1;
-    Small value;
-    value.fill(n);
-    if (ptrace(PTRACE_TRACEME, 0, nullptr, nullptr) != 0) return 1;
-    raise(SIGSTOP);
-    writer.write(value, static_cast<TimeNs>(n));
-    raise(SIGUSR1);
-    return 0;
-  });
-  int status = test::wait_for(child);
-  if (!WIFSTOPPED(status)) return -1;
-  int result = 0;
-  for (std::uint64_t i = 0; i < steps && result == 0; ++i) {
-    ptrace(PTRACE_SINGLESTEP, child, nullptr, nullptr);
-    status = test::wait_for(child);
-    if (WIFSTOPPED(status) && WSTOPSIG(status) == SIGUSR1) result = 1;
-  }
-  kill(child, SIGKILL);
-  while (!WIFSIGNALED(status) && !WIFEXITED(status)) status = test::wait_for(child);
-  return result;
-}
-
-TEST_F(Crash, WriterKilledAfterEachSingleInstructionOfPublish) {
-#if defined(__SANITIZE_THREAD__)
-  constexpr std::uint64_t kStride = 61;  // thousands of instructions
-#elif defined(__SANITIZE_ADDRESS__)
-  constexpr std::uint64_t kStride = 3;
-#else
-  constexpr std::uint64_t kStride = 1;
-#endif
-  { const Region region = Region::create(name_, one_ring(3, sizeof(Small))); }
-  const Region region = Region::attach(name_);
-  RingReader reader(region, "data");
-  std::uint64_t steps = 0, deaths = 0;
-  for (int outcome = 0; outcome == 0; steps += kStride, ++deaths) {
-    const std::uint64_t before = reader.newest();
-    outcome = publish_and_die_after(name_, steps);
-    if (outcome < 0) GTEST_SKIP() << "ptrace is not permitted here";
-    ASSERT_TRUE(reader.newest() == before || reader.newest() == before + 1) << "after instruction " << steps;
-    for (std::uint64_t n = reader.newest(); n > 0 && n + 1 >= reader.newest();
-         --n) {  // the two that must still be there
-      Small value{};
-      ASSERT_TRUE(reader.copy(n, value)) << "after instruction " << steps;
-      for (const auto word : value) ASSERT_EQ(word, n) << "after instruction " << steps;
-    }
-    while (const Sample sample = reader.next()) ASSERT_TRUE(reader.intact(sample));
-    ASSERT_LT(steps, 200'000u);
-  }
-  EXPECT_EQ(reader.lost(), 0u);
-  EXPECT_GT(deaths, 20u);
-  RecordProperty("deaths", std::to_string(deaths));
 }
 
 TEST_F(Crash, ReadersKilledAndStoppedAtRandomNeverHoldTheWriterUp) {
