@@ -26,12 +26,12 @@ const char* name_of(Verdict verdict);
 struct CellResult {
   Cell cell;
   Verdict verdict = Verdict::kSkipped;
-  std::string why;      ///< of a verdict that is not ok
-  std::string outcome;  ///< what became of the flight
-  Reaction reaction;
-  std::vector<Violation> violations;
+  std::string why = {};      ///< of a verdict that is not ok
+  std::string outcome = {};  ///< what became of the flight
+  Reaction reaction = {};
+  std::vector<Violation> violations = {};
   std::uint64_t records_lost = 0;
-  std::filesystem::path folder;
+  std::filesystem::path folder = {};
 };
 
 struct CampaignOptions {

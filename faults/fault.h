@@ -19,11 +19,11 @@ const char* name_of(Phase phase);
 
 /// Who does it (injector.cpp).
 enum class Injector : std::uint8_t {
-  kPoint,       ///< a fault point of the flight over its control socket: `what` [value] [target]
-  kWire,        ///< the tap: `what` is a wire fault, value its value; towards the flight, or with target "autopilot" back
-  kHangUp,      ///< the line is gone
-  kGround,      ///< a ground station commands the autopilot: `what`, value
-  kSignal,      ///< `what`: kill, stop (CONT at the end), segv, abort; to the process `target`
+  kPoint,   ///< a fault point of the flight over its control socket: `what` [value] [target]
+  kWire,    ///< the tap: `what` is a wire fault, value its value; towards the flight, or with target "autopilot" back
+  kHangUp,  ///< the line is gone
+  kGround,  ///< a ground station commands the autopilot: `what`, value
+  kSignal,  ///< `what`: kill, stop (CONT at the end), segv, abort; to the process `target`
   kThreadStop,  ///< the thread `target` of the flight stands still, as under a debugger
   kSteal,       ///< policy, priority or core of the thread `target` taken: `what`
   kLimit,       ///< prlimit `what` of the process `target` becomes value
@@ -48,10 +48,10 @@ enum class Promise : std::uint8_t {
 const char* name_of(Promise promise);
 
 struct Fault {
-  std::string_view id;
+  std::string_view id = {};
   int class_number = 0;  ///< of the catalogue, 1 ... 17
   Injector injector = Injector::kPoint;
-  std::string_view what;
+  std::string_view what = {};
   double value = 0;
   std::string_view target = {};
   double for_s = 1.0;
@@ -60,11 +60,11 @@ struct Fault {
   double response_ms = 0;   ///< likewise
   double recovered_ms = 0;  ///< since its end (the guardian's restart: since it began); 0: it does not
   unsigned phases = kHover | kCruise;
-  std::string_view says = {};       ///< reason in the heartbeat, or text in the log
-  double tainted_after_ms = 0;      ///< frames exposed later than this must not be used; 0: they may
-  bool isolated = false;            ///< the flight does not survive it: one for itself
-  bool noisy = false;               ///< it disturbs the reference loop too
-  bool in_short = false;            ///< part of the short set
+  std::string_view says = {};   ///< reason in the heartbeat, or text in the log
+  double tainted_after_ms = 0;  ///< frames exposed later than this must not be used; 0: they may
+  bool isolated = false;        ///< the flight does not survive it: one for itself
+  bool noisy = false;           ///< it disturbs the reference loop too
+  bool in_short = false;        ///< part of the short set
 };
 
 }  // namespace wasp::faults

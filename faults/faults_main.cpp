@@ -1,5 +1,5 @@
-// `wasp faults`: every fault of the catalogue, in every phase of a flight it applies to, done for real to a flight of its
-// own; the answer measured on the serial line by this program, which is no part of the flight.
+// `wasp faults`: every fault of the catalogue, in every phase of a flight it applies to, done for real to a flight of
+// its own; the answer measured on the serial line by this program, which is no part of the flight.
 #include <fmt/format.h>
 #include <signal.h>
 

@@ -28,7 +28,8 @@ constexpr const char* kCruiseWorld =
     "[run]\nsafety_pilot = false\n[world]\nkind = \"corridor\"\n[wind]\ngust_mps = 0.2\n";
 
 constexpr const char* kCruise =
-    "[control]\nvelocity_hold = \"both\"\n[behaviour.flow_field]\nenabled = true\n[behaviour.odometry]\nenabled = true\n"
+    "[control]\nvelocity_hold = \"both\"\n[behaviour.flow_field]\nenabled = true\n[behaviour.odometry]\nenabled = "
+    "true\n"
     "[behaviour.flow_balance]\nenabled = true\n[behaviour.obstacle_depth]\nenabled = true\n"
     "[behaviour.edge_altitude]\nenabled = false\n";
 constexpr const char* kHoverControl = "[behaviour.edge_altitude]\nenabled = false\n";
@@ -80,7 +81,7 @@ std::string flight_text(const FlightPlan& plan) {
       "endpoint = \"serial:{}:921600\"\n",
       (folder / "incidents").string(), (folder / "tty").string());
   text += kCamera;
-  text += std::string("[mission]\npatience_s = 3000.0\n") + mission(plan.phase);
+  text += std::string("[mission]\npatience_s = 600.0\n") + mission(plan.phase);
   return text + (plan.phase == Phase::kCruise ? kCruise : kHoverControl);
 }
 
@@ -113,8 +114,7 @@ Abilities find_abilities() {
 
 void write_configuration(const FlightPlan& plan) {
   fs::create_directories(plan.folder);
-  write(plan.folder / "sim.toml",
-        std::string(kCamera) + (plan.phase == Phase::kCruise ? kCruiseWorld : kHoverWorld));
+  write(plan.folder / "sim.toml", std::string(kCamera) + (plan.phase == Phase::kCruise ? kCruiseWorld : kHoverWorld));
   write(plan.folder / "flight.toml", flight_text(plan));
   if (!plan.weakened.empty()) write(plan.folder / "weakened.toml", plan.weakened);
 }
@@ -137,15 +137,26 @@ std::string flight_line(const FlightPlan& plan) { return (plan.folder / "tty").s
 std::string fault_socket(const FlightPlan& plan) { return (plan.folder / "faults.sock").string(); }
 
 std::vector<std::string> sim_arguments(const FlightPlan& plan) {
-  return {tools::program("wasp-sim"),         "--instance",          plan.instance, "--config",
-          (plan.folder / "sim.toml").string(), "--seed",              std::to_string(plan.seed),
-          "--tty-link",                        autopilot_line(plan), "--no-camera"};
+  return {tools::program("wasp-sim"),
+          "--instance",
+          plan.instance,
+          "--config",
+          (plan.folder / "sim.toml").string(),
+          "--seed",
+          std::to_string(plan.seed),
+          "--tty-link",
+          autopilot_line(plan),
+          "--no-camera"};
 }
 
 std::vector<std::string> camera_arguments(const FlightPlan& plan) {
-  return {tools::program("wasp-sim"),         "--instance", plan.instance,
-          "--config",                          (plan.folder / "sim.toml").string(),
-          "--seed",                            std::to_string(plan.seed),
+  return {tools::program("wasp-sim"),
+          "--instance",
+          plan.instance,
+          "--config",
+          (plan.folder / "sim.toml").string(),
+          "--seed",
+          std::to_string(plan.seed),
           "--camera-only"};
 }
 
@@ -154,12 +165,13 @@ std::vector<std::string> recorder_arguments(const FlightPlan& plan) {
 }
 
 std::vector<std::string> flight_arguments(const FlightPlan& plan) {
-  std::vector<std::string> a;
-  if (plan.guarded && plan.abilities.guardian)
-    a = {tools::program("wasp"), "guard", "--config", (plan.folder / "flight.toml").string(), "--", "flight"};
-  else
-    a = {tools::program("wasp"), "flight"};
-  a.insert(a.end(), {"--instance", plan.instance, "--config", (plan.folder / "flight.toml").string()});
+  const bool guarded = plan.guarded && plan.abilities.guardian;
+  std::vector<std::string> a{tools::program("wasp"),
+                             guarded ? "guard" : "flight",
+                             "--instance",
+                             plan.instance,
+                             "--config",
+                             (plan.folder / "flight.toml").string()};
   if (!plan.weakened.empty()) a.insert(a.end(), {"--config", (plan.folder / "weakened.toml").string()});
   if (!plan.abilities.real_time) a.push_back("--no-rt");
   if (plan.abilities.fault_points) a.insert(a.end(), {"--fault-socket", fault_socket(plan)});

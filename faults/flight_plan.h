@@ -25,7 +25,7 @@ struct FlightPlan {
   Phase phase = Phase::kHover;
   std::uint32_t seed = 1;
   Abilities abilities;
-  bool guarded = true;   ///< where it can be
+  bool guarded = true;  ///< where it can be
   bool recorder = false;
   std::string weakened;  ///< TOML after all others: a negative control
   std::vector<std::string> flight_options = {};

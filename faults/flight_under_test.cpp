@@ -36,7 +36,6 @@ std::string first_line(const fs::path& path) {
   return line;
 }
 
-
 std::unique_ptr<tools::WakeupLoop> start_reference() {
   tools::WakeupSpec spec{.core = rt::nearest_usable_core(kControlCore),
                          .priority = kReferencePriority,
@@ -51,7 +50,9 @@ std::unique_ptr<tools::WakeupLoop> start_reference() {
   }
 }
 
-bool in_leg(const Command& c, int leg) { return control::leg_of(static_cast<control::MissionPhase>(c.mission_phase)) == leg; }
+bool in_leg(const Command& c, int leg) {
+  return control::leg_of(static_cast<control::MissionPhase>(c.mission_phase)) == leg;
+}
 
 /// Has the flight reached the point where faults of the phase begin?
 bool reached(Phase phase, const Command& c, DurationNs in_phase_ns) {
@@ -113,9 +114,8 @@ FlightUnderTest::~FlightUnderTest() {
     }
   watch_.reset();
   tap_.reset();
-  for (const auto& region :
-       {shm::flight_region(plan_.instance), shm::camera_region(plan_.instance), shm::truth_region(plan_.instance),
-        "wasp." + plan_.instance + ".relay"})
+  for (const auto& region : {shm::flight_region(plan_.instance), shm::camera_region(plan_.instance),
+                             shm::truth_region(plan_.instance), "wasp." + plan_.instance + ".relay"})
     shm::Region::remove(region);
 }
 

@@ -99,8 +99,7 @@ void FlightWatch::look() {
       exposures_.push_back(header.exposed_at_ns);
     }
   }
-  if (rings_->truth.attach(shm::truth_region(instance_), shm::kTruth, "Truth"))
-    rings_->truth.ring->copy_newest(truth_);
+  if (rings_->truth.attach(shm::truth_region(instance_), shm::kTruth, "Truth")) rings_->truth.ring->copy_newest(truth_);
 }
 
 Command FlightWatch::newest() const {

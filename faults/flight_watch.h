@@ -38,7 +38,7 @@ class FlightWatch {
   [[nodiscard]] std::vector<Command> commands() const;
   [[nodiscard]] std::vector<Stretch> commands_unseen() const;   ///< we looked too late: they were overwritten
   [[nodiscard]] std::vector<Stretch> exposures_unseen() const;  ///< likewise
-  [[nodiscard]] std::vector<TimeNs> exposures() const;  ///< of the front camera, rising as published
+  [[nodiscard]] std::vector<TimeNs> exposures() const;          ///< of the front camera, rising as published
   [[nodiscard]] FlightCounts counts() const;
   [[nodiscard]] Truth truth() const;
   /// Lets go of all regions and looks no more (before somebody cuts them short).

@@ -77,8 +77,7 @@ Injected failed(std::string why) { return {rt::now(), std::move(why), {}}; }
 std::vector<std::uint8_t> command(std::uint16_t id, std::array<float, 7> p, std::uint8_t to_component = 1) {
   static mavlink::Encoder encoder(255, 190);
   mavlink::CommandLong m{};
-  m.param1 = p[0], m.param2 = p[1], m.param3 = p[2], m.param4 = p[3], m.param5 = p[4], m.param6 = p[5],
-  m.param7 = p[6];
+  m.param1 = p[0], m.param2 = p[1], m.param3 = p[2], m.param4 = p[3], m.param5 = p[4], m.param6 = p[5], m.param7 = p[6];
   m.command = id, m.target_system = 1, m.target_component = to_component;
   std::vector<std::uint8_t> bytes(mavlink::kMaxFrame);
   bytes.resize(encoder.encode(m, bytes));
@@ -126,8 +125,8 @@ Injected ground(const Fault& f, FlightUnderTest& flight) {
     return {at_ns, {}, [say] { say(mav_cmd::kDoSetMode, {1, 1}); }};
   }
   if (f.what == "arm_companion") {
-    flight.tap().inject(Direction::kToFlight, command(mav_cmd::kComponentArmDisarm, {1},
-                                                      mav_component::kCompIdOnboardComputer));
+    flight.tap().inject(Direction::kToFlight,
+                        command(mav_cmd::kComponentArmDisarm, {1}, mav_component::kCompIdOnboardComputer));
     return {at_ns, {}, {}};
   }
   const auto unit = find(kUnits, f.what);
@@ -191,8 +190,13 @@ Injected hog(const Fault& f) {
 }
 
 Injected load(const Fault& f, FlightUnderTest& flight) {
-  std::vector<std::string> a{kStress, "--quiet", "--timeout", fmt::format("{}", static_cast<int>(f.for_s) + 5),
-                             "--temp-path", flight.plan().folder.string(), fmt::format("--{}", f.what),
+  std::vector<std::string> a{kStress,
+                             "--quiet",
+                             "--timeout",
+                             fmt::format("{}", static_cast<int>(f.for_s) + 5),
+                             "--temp-path",
+                             flight.plan().folder.string(),
+                             fmt::format("--{}", f.what),
                              fmt::format("{}", static_cast<int>(f.value))};
   if (f.what == "vm") a.insert(a.end(), {"--vm-bytes", "25%"});
   if (f.what == "hdd") a.insert(a.end(), {"--hdd-bytes", "64M"});
@@ -282,7 +286,8 @@ std::string missing_for(const Fault& fault, const Abilities& abilities) {
   if (fault.injector == Injector::kPoint && !abilities.fault_points) return "this wasp has no fault points";
   if (fault.injector == Injector::kStart) return {};
   if (!abilities.renderer) return "no camera: built without the renderer";
-  if (fault.injector == Injector::kClock && !abilities.own_machine) return "changes the machine's clock: in the guest only";
+  if (fault.injector == Injector::kClock && !abilities.own_machine)
+    return "changes the machine's clock: in the guest only";
   const bool scheduling = fault.injector == Injector::kSteal || fault.injector == Injector::kHog;
   if (scheduling && !abilities.real_time) return "needs real-time rights";
   if (fault.injector == Injector::kLoad && access(kStress, X_OK) != 0) return "needs stress-ng";

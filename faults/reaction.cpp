@@ -32,10 +32,8 @@ void read_beats(const WireReader& wire, const Trial& trial, Reaction& r) {
       r.detected_ms = ms_between(trial.began_ns, beat.at_ns);
       r.reason = beat.state.reason, r.mode = beat.state.mode;
     }
-    const bool next = before && beat.state.incarnation > before->incarnation && !beat.state.guardian;
     const bool commands = !beat.alarmed() && beat.state.mode == FlightMode::kBehaviour && beat.at_ns > trial.ended_ns;
-    if (!r.recovered_ms && r.detected_ms && (next || commands))
-      r.recovered_ms = ms_between(next ? trial.began_ns : trial.ended_ns, beat.at_ns);
+    if (!r.recovered_ms && r.detected_ms && commands) r.recovered_ms = ms_between(trial.ended_ns, beat.at_ns);
   }
 }
 
@@ -99,6 +97,13 @@ void read_line(const WireReader& wire, const Trial& trial, TimeNs gone_logged_ns
   if (back != wire.setpoints.end()) r.recovered_ms = ms_between(trial.ended_ns, back->at_ns);
 }
 
+void read_restart(const std::vector<Command>& commands, const Trial& trial, Reaction& r) {
+  r.recovered_ms.reset();
+  for (std::size_t i = 1; i < commands.size() && !r.recovered_ms; ++i)
+    if (commands[i].released_at_ns > trial.began_ns && commands[i].tick < commands[i - 1].tick)
+      r.recovered_ms = ms_between(trial.began_ns, commands[i].released_at_ns);
+}
+
 bool answers_in(const Fault& fault, Phase phase) {
   return phase != Phase::kIdle || fault.promise == Promise::kGuardian || fault.promise == Promise::kLineBack;
 }
@@ -109,6 +114,8 @@ std::optional<Breach> breach_of(const Fault& fault, Phase phase, const Reaction&
       if (r.alarmed || r.guardian) return Breach{"alarm without cause", kNotExplained};
       return std::nullopt;
     case Promise::kGuardian:
+      if (phase == Phase::kIdle)  // nothing to be said for: it commands nothing
+        return r.recovered_ms ? std::nullopt : std::optional(Breach{"not started again", kNotExplained});
       if (!r.guardian) return Breach{"the guardian did not speak", kNotExplained};
       return late(fault, r, times);
     case Promise::kNeutral:

@@ -3,9 +3,11 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "faults/fault.h"
 #include "faults/wire_reader.h"
+#include "types/messages.h"
 
 namespace wasp::faults {
 
@@ -16,12 +18,13 @@ struct Trial {
 
 /// Milliseconds; absent: it was not seen.
 struct Reaction {
-  std::optional<double> detected_ms;   ///< since the fault began: first heartbeat that tells
-  std::optional<double> response_ms;   ///< likewise: first of the setpoints that are all neutral, or the stream's end
-  std::optional<double> recovered_ms;  ///< since its end: first heartbeat "behaviours command", or of the next incarnation
-  bool alarmed = false;                ///< CRITICAL or EMERGENCY meanwhile
-  bool guardian = false;               ///< the guardian spoke
-  int incarnation = 0;                 ///< of the last heartbeat
+  std::optional<double> detected_ms;  ///< since the fault began: first heartbeat that tells
+  std::optional<double> response_ms;  ///< likewise: first of the setpoints that are all neutral, or the stream's end
+  std::optional<double>
+      recovered_ms;       ///< since its end: first heartbeat "behaviours command", or of the next incarnation
+  bool alarmed = false;   ///< CRITICAL or EMERGENCY meanwhile
+  bool guardian = false;  ///< the guardian spoke
+  int incarnation = 0;    ///< of the last heartbeat
   bool stream_ended = false;
   ModeReason reason = ModeReason::kNone;  ///< of the first heartbeat that tells
   FlightMode mode = FlightMode::kDisarmed;
@@ -36,6 +39,10 @@ struct Breach {
   std::string why;
   double excess_ms = 0;  ///< late by; infinite: it never came, or no delay of the host explains it
 };
+
+/// For a flight process that was started again: since the fault began, by the new process' first tick in the command
+/// ring, which goes on behind the old one's.
+void read_restart(const std::vector<Command>& commands, const Trial& trial, Reaction& reaction);
 
 /// What is wrong with a reaction by the fault's promise. Without `times`, only whether it came.
 std::optional<Breach> breach_of(const Fault& fault, Phase phase, const Reaction& reaction, bool times);

@@ -26,8 +26,8 @@ nlohmann::json number(const std::optional<double>& value) { return value ? nlohm
 }  // namespace
 
 std::string table_head() {
-  return fmt::format("{:<30} {:<8} {:>4} {:>9} {:<9} {:>9} {:>10} {:<22} {:>5} {}", "fault", "phase", "seed", "detected",
-                     "response", "after", "recovered", "outcome", "lost", "verdict");
+  return fmt::format("{:<30} {:<8} {:>4} {:>9} {:<9} {:>9} {:>10} {:<22} {:>5} {}", "fault", "phase", "seed",
+                     "detected", "response", "after", "recovered", "outcome", "lost", "verdict");
 }
 
 std::string table_row(const CellResult& r) {
@@ -50,8 +50,8 @@ std::string table_foot(const std::vector<CellResult>& results) {
                           name_of(v.offence), to_seconds(v.at_ns), v.value, v.bytes);
   }
   if (!text.empty()) text = "violations on the wire:\n" + text;
-  return text + fmt::format("{} cells: {} ok, {} MISS, {} host noise, {} skipped\n", results.size(), counts[0], counts[1],
-                            counts[2], counts[3]);
+  return text + fmt::format("{} cells: {} ok, {} MISS, {} host noise, {} skipped\n", results.size(), counts[0],
+                            counts[1], counts[2], counts[3]);
 }
 
 std::string catalogue_list() {

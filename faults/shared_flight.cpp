@@ -12,11 +12,11 @@
 namespace wasp::faults {
 namespace {
 
-constexpr double kReach_s = 60, kSettle_s = 20;    // to the phase; back to it
-constexpr double kRecover_s = 4, kGenerous_s = 40;  // after a fault, with times judged and without
-constexpr double kAfterwards_s = 0.6;               // watched after the recovery
-constexpr DurationNs kOverrun = kMillisecond;       // of the reference loop: one of its periods
-constexpr float kCorridorEnd_m = 22.f;              // of 30
+constexpr double kReach_s = 60, kSettle_s = 20;                      // to the phase; back to it
+constexpr double kRecover_s = 4, kGenerous_s = 40, kLanding_s = 15;  // after a fault, with times judged and without
+constexpr double kAfterwards_s = 0.6;                                // watched after the recovery
+constexpr DurationNs kOverrun = kMillisecond;                        // of the reference loop: one of its periods
+constexpr float kCorridorEnd_m = 22.f;                               // of 30
 
 /// Promises after which the flight does not command any more.
 bool final(const Fault& fault) {
@@ -56,6 +56,7 @@ std::vector<CellResult> SharedFlight::fly(std::deque<Cell>& queue) {
   const bool there = flight_.wait_for(plan_.phase, kReach_s);
   if (!there) {
     CellResult result{.cell = queue.front(), .verdict = Verdict::kMiss, .why = "the flight never came so far"};
+    if (const auto log = flight_.log(); !log.empty()) result.why += ": " + log.back().text;
     result.folder = plan_.folder;
     queue.pop_front();
     return {result};
@@ -86,7 +87,8 @@ SharedFlight::Done SharedFlight::try_cell(const Cell& cell) {
   done.trial.ended_ns = rt::now();
   if (injected.undo) injected.undo();
   if (done.error.empty()) wait_for_answer(cell, done);
-  done.outcome = outcome_of(cell);
+  done.outcome = outcome();
+  done.crashed = flight_.exit_code().value_or(0) >= 126;
   done.trial.watched_until_ns = rt::now();
   done.counts = flight_.watch().counts();
   return done;
@@ -95,22 +97,25 @@ SharedFlight::Done SharedFlight::try_cell(const Cell& cell) {
 /// Until the fault is recovered from and a little longer, or patience is over.
 void SharedFlight::wait_for_answer(const Cell& cell, Done& done) {
   const Fault& fault = *cell.fault;
-  const double patience_s = options_.times ? fault.recovered_ms * 1e-3 + kRecover_s : kGenerous_s;
+  const double landing_s = final(fault) || !shares(plan_.phase) ? kLanding_s : 0;
+  const double patience_s = options_.times ? fault.recovered_ms * 1e-3 + kRecover_s + landing_s : kGenerous_s;
   const TimeNs until_ns = rt::now() + from_seconds(patience_s);
   const auto answered = [&] {
-    if (!shares(plan_.phase)) return !flight_.running();
-    if (fault.promise == Promise::kEnds) return !flight_.running();
+    if (!shares(plan_.phase) || fault.promise == Promise::kEnds) return !flight_.running();
     if (fault.promise != Promise::kGuardian) return flight_.settled(plan_.phase);
-    done.trial.watched_until_ns = rt::now();
-    return react(flight_.wire(), done.trial).recovered_ms.has_value();
+    return cell.phase == Phase::kIdle ? flight_.watch().counts().incarnation > 0 : !flight_.running();
   };
   while (rt::now() < until_ns && flight_.running() && !interrupted_() && !answered())
     rt::sleep_until(rt::now() + 10 * kMillisecond);
   sleep_until(rt::now() + from_seconds(kAfterwards_s));
 }
 
-std::string SharedFlight::outcome_of(const Cell&) {
-  if (const auto code = flight_.exit_code()) return fmt::format("ended, code {}", *code);
+std::string SharedFlight::outcome() {
+  const auto code = flight_.exit_code();
+  const auto& texts = flight_.wire().texts;
+  if (code && *code < 128 && !texts.empty() && texts.back().text.find("landed") != std::string::npos)
+    return "landed by autopilot";
+  if (code) return *code == 0 ? "flown to its end" : fmt::format("ended, code {}", *code);
   const FlightCounts counts = flight_.watch().counts();
   if (counts.incarnation > 0) return "started again";
   return flight_.settled(plan_.phase) ? "goes on" : "flies on otherwise";
@@ -133,8 +138,8 @@ WireEvidence SharedFlight::evidence() const {
   if (guardian_since_ns != kNever) e.not_joined.push_back({guardian_since_ns, kForever});
   for (const Done& d : done_) {
     const Fault& f = *d.cell.fault;
-    const bool silent = f.promise == Promise::kGuardian || f.promise == Promise::kLineBack ||
-                        f.promise == Promise::kEnds || f.noisy;
+    const bool silent =
+        f.promise == Promise::kGuardian || f.promise == Promise::kLineBack || f.promise == Promise::kEnds || f.noisy;
     if (silent) e.gaps_excused.push_back({d.trial.began_ns, d.trial.watched_until_ns});
     if (f.promise == Promise::kGuardian || f.injector == Injector::kSignal)
       e.not_joined.push_back({d.trial.began_ns - 100 * kMillisecond, d.trial.watched_until_ns});
@@ -168,6 +173,7 @@ CellResult SharedFlight::judge(const Done& d, const std::vector<Violation>& viol
     });
     read_line(flight_.wire(), d.trial, gone == log.end() ? kForever : gone->at_ns, r.reaction);
   }
+  if (fault.promise == Promise::kGuardian) read_restart(flight_.watch().commands(), d.trial, r.reaction);
   const bool only = done_.size() == 1;
   const bool last = d.trial.began_ns == done_.back().trial.began_ns;
   const auto belongs = [&](const Violation& v) {
@@ -192,8 +198,7 @@ CellResult SharedFlight::judge(const Done& d, const std::vector<Violation>& viol
     blame(fmt::format("{} on the wire ({:.3g})", name_of(v.offence), v.value), excess_ms(v, limits_of(plan_)));
   const bool may_end = final(fault) || !shares(plan_.phase);
   if (!may_end && d.outcome != "goes on") blame("the flight did not go on: " + d.outcome, kNotExplained);
-  if (d.outcome.starts_with("ended") && d.outcome.find("code 1") != std::string::npos && d.outcome.size() > 13)
-    blame("the flight crashed: " + d.outcome, kNotExplained);
+  if (d.crashed && fault.id != "guardian-killed") blame("crashed: " + d.outcome, kNotExplained);
   if (!fault.says.empty() && answers_in(fault, d.cell.phase)) {
     const bool said = std::ranges::any_of(log, [&](const LogLine& l) {
       return l.at_ns >= d.trial.began_ns - kSecond && l.text.find(fault.says) != std::string::npos;

@@ -15,21 +15,23 @@ class SharedFlight {
  public:
   SharedFlight(const CampaignOptions& options, const FlightPlan& plan, const std::function<bool()>& interrupted);
 
-  /// Takes cells from the front of `queue` as long as the flight is fit for them, at least one; returns what came of them.
+  /// Takes cells from the front of `queue` as long as the flight is fit for them, at least one; returns what came of
+  /// them.
   std::vector<CellResult> fly(std::deque<Cell>& queue);
 
  private:
   struct Done {
     Cell cell;
-    Trial trial;
-    std::string error;  ///< it could not be done
-    std::string outcome;
-    FlightCounts counts;
+    Trial trial = {};
+    std::string error = {};  ///< it could not be done
+    std::string outcome = {};
+    bool crashed = false;
+    FlightCounts counts = {};
   };
   bool sleep_until(TimeNs until_ns);
   Done try_cell(const Cell& cell);
   void wait_for_answer(const Cell& cell, Done& done);
-  [[nodiscard]] std::string outcome_of(const Cell& cell);
+  [[nodiscard]] std::string outcome();
   std::vector<CellResult> judge();
   CellResult judge(const Done& done, const std::vector<Violation>& violations,
                    const std::vector<tools::Wakeup>& reference);

@@ -1,7 +1,7 @@
 #include "faults/start_cell.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
+#include <signal.h>
 
 #include <array>
 #include <fstream>
@@ -60,8 +60,9 @@ constexpr std::array kRows = {
              "setpriv --bounding-set=-all --inh-caps=-all sh -c 'ulimit -l 8192; exec $wasp flight --instance $name'"},
     StartRow{"no priority", "",
              "setpriv --bounding-set=-all --inh-caps=-all sh -c 'ulimit -r 0; exec $wasp flight --instance $name'"},
-    StartRow{"shm full", "",
-             "unshare -m sh -c 'mount -t tmpfs -o size=64k tmpfs /dev/shm && exec $wasp flight --no-rt --instance $name'"},
+    StartRow{
+        "shm full", "",
+        "unshare -m sh -c 'mount -t tmpfs -o size=64k tmpfs /dev/shm && exec $wasp flight --no-rt --instance $name'"},
     StartRow{"no descriptors", "", "ulimit -n 4; exec $wasp flight --no-rt --instance $name"},
     StartRow{"disk full", "",
              "mkdir $dir/small; unshare -m sh -c 'mount -t tmpfs -o size=4k tmpfs $dir/small && exec $wasp record "
@@ -102,8 +103,9 @@ StartResult try_start(const Fault& fault, const fs::path& folder, const std::str
   fs::create_directories(folder);
   std::ofstream(folder / "bad", std::ios::binary) << row->content;
   const std::string log = (folder / "output.txt").string();
-  std::string script = fmt::format("wasp={} bad={} dir={} name={}; export wasp bad dir name; {}", tools::program("wasp"),
-                                   (folder / "bad").string(), fs::absolute(folder).string(), instance, row->command);
+  std::string script =
+      fmt::format("wasp={} bad={} dir={} name={}; export wasp bad dir name; {}", tools::program("wasp"),
+                  (folder / "bad").string(), fs::absolute(folder).string(), instance, row->command);
   StartResult result;
   {
     const auto other = occupy(fault.what, instance);

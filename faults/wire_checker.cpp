@@ -87,7 +87,8 @@ class Checker {
 
   void evidence() {
     const std::vector<int> commands = join(wire_.setpoints, evidence_.commands);
-    const TimeNs first_ns = evidence_.commands.front().released_at_ns, last_ns = evidence_.commands.back().released_at_ns;
+    const TimeNs first_ns = evidence_.commands.front().released_at_ns,
+                 last_ns = evidence_.commands.back().released_at_ns;
     for (std::size_t i = 0; i < commands.size(); ++i) {
       const Setpoint& s = wire_.setpoints[i];
       if (s.at_ns < first_ns || s.at_ns > last_ns) continue;
@@ -103,12 +104,10 @@ class Checker {
     const double age_ms = to_seconds(s.at_ns - exposed_at_ns) * 1e3;
     if (s.at_ns - exposed_at_ns > limits_.cue_age_ns + limits_.slack_ns)
       report(Offence::kOldEvidence, s.at_ns, age_ms, &s);
-    if (within(evidence_.tainted, exposed_at_ns))
-      report(Offence::kTaintedFrame, s.at_ns, age_ms, &s);
+    if (within(evidence_.tainted, exposed_at_ns)) report(Offence::kTaintedFrame, s.at_ns, age_ms, &s);
     const auto& shown = evidence_.exposures;
     if (shown.empty() || exposed_at_ns < shown.front() || within(evidence_.unseen, exposed_at_ns)) return;
-    if (std::ranges::find(shown, exposed_at_ns) == shown.end())
-      report(Offence::kNoSuchFrame, s.at_ns, age_ms, &s);
+    if (std::ranges::find(shown, exposed_at_ns) == shown.end()) report(Offence::kNoSuchFrame, s.at_ns, age_ms, &s);
   }
 
   const WireReader& wire_;
@@ -126,9 +125,9 @@ bool same(const Setpoint& s, const Command& c) {
 }  // namespace
 
 const char* name_of(Offence offence) {
-  constexpr std::array kNames = {"not finite",  "no rotation",     "tilt",     "yaw rate",
-                                 "thrust",      "resent",          "gap",      "asked to arm again",
-                                 "no tick's",   "old evidence",    "no such frame", "tainted frame"};
+  constexpr std::array kNames = {"not finite", "no rotation",  "tilt",          "yaw rate",
+                                 "thrust",     "resent",       "gap",           "asked to arm again",
+                                 "no tick's",  "old evidence", "no such frame", "tainted frame"};
   static_assert(kNames.size() == static_cast<std::size_t>(Offence::kCount));
   return kNames[static_cast<std::size_t>(offence)];
 }

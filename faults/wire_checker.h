@@ -15,15 +15,16 @@ struct WireLimits {
   float max_tilt_rad = 0.2618f;
   float max_yaw_rate_radps = 0.8f;
   DurationNs period_ns = 50 * kMillisecond;
-  DurationNs longest_gap_ns = 160 * kMillisecond;  ///< between setpoints to an armed vehicle: three periods and a tick's lateness
-  DurationNs cue_age_ns = 250 * kMillisecond;      ///< evidence at the time on the wire
-  DurationNs slack_ns = 2 * kMillisecond;          ///< from the flight's write to our time stamp
+  DurationNs longest_gap_ns =
+      160 * kMillisecond;  ///< between setpoints to an armed vehicle: three periods and a tick's lateness
+  DurationNs cue_age_ns = 250 * kMillisecond;  ///< evidence at the time on the wire
+  DurationNs slack_ns = 2 * kMillisecond;      ///< from the flight's write to our time stamp
 };
 
 enum class Offence : std::uint8_t {
-  kNotFinite,     ///< a number that is none
-  kNoRotation,    ///< a quaternion whose length is not 1
-  kTilt,          ///< beyond the configured limit
+  kNotFinite,   ///< a number that is none
+  kNoRotation,  ///< a quaternion whose length is not 1
+  kTilt,        ///< beyond the configured limit
   kYawRate,
   kThrust,
   kResent,        ///< the bytes of an earlier setpoint once more
@@ -40,17 +41,18 @@ const char* name_of(Offence offence);
 struct Violation {
   Offence offence = Offence::kNotFinite;
   TimeNs at_ns = 0;
-  double value = 0;  ///< how much: rad, 1, ms
+  double value = 0;   ///< how much: rad, 1, ms
   std::string bytes;  ///< hex of the setpoint
 };
 
 struct WireEvidence {
-  std::vector<Command> commands;     ///< of the flight's ring, in order; empty: not joined
-  std::vector<TimeNs> exposures;     ///< that the camera showed, rising; empty: not joined
+  std::vector<Command> commands;      ///< of the flight's ring, in order; empty: not joined
+  std::vector<TimeNs> exposures;      ///< that the camera showed, rising; empty: not joined
   std::vector<Stretch> gaps_excused;  ///< silence is what the fault causes, or what is promised
-  std::vector<Stretch> not_joined;    ///< the guardian speaks, a process that died could not write its ring, we were blind
-  std::vector<Stretch> unseen;        ///< exposures that we may have missed ourselves
-  std::vector<Stretch> tainted;       ///< exposures that must not be used any more
+  std::vector<Stretch>
+      not_joined;                ///< the guardian speaks, a process that died could not write its ring, we were blind
+  std::vector<Stretch> unseen;   ///< exposures that we may have missed ourselves
+  std::vector<Stretch> tainted;  ///< exposures that must not be used any more
 };
 
 /// In order of time.

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "faults/uart_line.h"
+#include "messages/checksum.h"
 
 namespace wasp::faults {
 namespace {
@@ -90,8 +91,7 @@ void WireMangler::mangle_frame(const mavlink::Frame& frame, std::vector<std::uin
       std::vector<std::uint8_t> bytes(frame.wire.begin(), frame.wire.end());
       bytes[5] = static_cast<std::uint8_t>(fault_.value);
       const std::size_t end = kHeaderV2 + frame.length;
-      const std::uint16_t crc =
-          crc_add(crc_add(kCrcInitial, std::span(bytes).subspan(1, end - 1)), info->crc_extra);
+      const std::uint16_t crc = crc_add(crc_add(kCrcInitial, std::span(bytes).subspan(1, end - 1)), info->crc_extra);
       bytes[end] = static_cast<std::uint8_t>(crc), bytes[end + 1] = static_cast<std::uint8_t>(crc >> 8);
       out.insert(out.end(), bytes.begin(), bytes.end());
       return;
@@ -141,9 +141,10 @@ void WireMangler::mangle_frame(const mavlink::Frame& frame, std::vector<std::uin
     case WireFaultKind::kClockStep: {
       const double s = fault_.value;
       changed =
-          edit<AttitudeQuaternion>(frame, out,
-                                   [s](auto& m) { m.time_boot_ms += static_cast<std::uint32_t>(std::int64_t(s * 1e3)); }) ||
-          edit<HighresImu>(frame, out, [s](auto& m) { m.time_usec += static_cast<std::uint64_t>(std::int64_t(s * 1e6)); }) ||
+          edit<AttitudeQuaternion>(
+              frame, out, [s](auto& m) { m.time_boot_ms += static_cast<std::uint32_t>(std::int64_t(s * 1e3)); }) ||
+          edit<HighresImu>(frame, out,
+                           [s](auto& m) { m.time_usec += static_cast<std::uint64_t>(std::int64_t(s * 1e6)); }) ||
           edit<Timesync>(frame, out, [s](auto& m) {
             if (m.tc1 != 0) m.tc1 += from_seconds(s);
           });

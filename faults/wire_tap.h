@@ -1,6 +1,6 @@
-// A man in the middle of the serial line: the simulator's pseudo-terminal on one side, one of its own on the other, which
-// the flight opens. Every piece is logged with its time as it was written, then passed on as the faults leave it. The
-// thread runs SCHED_FIFO where that is allowed.
+// A man in the middle of the serial line: the simulator's pseudo-terminal on one side, one of its own on the other,
+// which the flight opens. Every piece is logged with its time as it was written, then passed on as the faults leave it.
+// The thread runs SCHED_FIFO where that is allowed.
 #pragma once
 
 #include <atomic>
