@@ -149,11 +149,14 @@ bool FlightUnderTest::wait_for(Phase phase, double patience_s) {
   return false;
 }
 
-bool FlightUnderTest::settled(Phase phase) {
+bool FlightUnderTest::commanded(Phase phase) {
   const Command c = watch_->newest();
   if (!running() || rt::now() - c.released_at_ns > 200 * kMillisecond) return false;
-  if (!reached(phase, c, rt::now() - watch_->phase_since_ns())) return false;
-  return phase == Phase::kIdle ? c.mode == FlightMode::kDisarmed : c.mode == FlightMode::kBehaviour;
+  return c.mode == (phase == Phase::kIdle ? FlightMode::kDisarmed : FlightMode::kBehaviour);
+}
+
+bool FlightUnderTest::settled(Phase phase) {
+  return commanded(phase) && reached(phase, watch_->newest(), rt::now() - watch_->phase_since_ns());
 }
 
 int FlightUnderTest::end(double patience_s) {

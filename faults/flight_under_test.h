@@ -33,7 +33,9 @@ class FlightUnderTest {
 
   /// True once the flight is where the phase begins; false when it ended, or after `patience_s`.
   bool wait_for(Phase phase, double patience_s);
-  /// In the phase, commanded by behaviours (idle: on the ground, disarmed), nothing wrong for half a second.
+  /// Commanded by behaviours (idle: on the ground, disarmed), now.
+  [[nodiscard]] bool commanded(Phase phase);
+  /// Besides, where faults of the phase may begin.
   [[nodiscard]] bool settled(Phase phase);
   /// The flight process, or the guardian above it, still runs.
   [[nodiscard]] bool running();

@@ -86,7 +86,7 @@ SharedFlight::Done SharedFlight::try_cell(const Cell& cell) {
   sleep_until(injected.at_ns + from_seconds(cell.fault->for_s));
   done.trial.ended_ns = rt::now();
   if (injected.undo) injected.undo();
-  if (done.error.empty()) wait_for_answer(cell, done);
+  if (done.error.empty()) wait_for_answer(cell);
   done.outcome = outcome();
   done.crashed = flight_.exit_code().value_or(0) >= 126;
   done.trial.watched_until_ns = rt::now();
@@ -95,14 +95,14 @@ SharedFlight::Done SharedFlight::try_cell(const Cell& cell) {
 }
 
 /// Until the fault is recovered from and a little longer, or patience is over.
-void SharedFlight::wait_for_answer(const Cell& cell, Done& done) {
+void SharedFlight::wait_for_answer(const Cell& cell) {
   const Fault& fault = *cell.fault;
   const double landing_s = final(fault) || !shares(plan_.phase) ? kLanding_s : 0;
   const double patience_s = options_.times ? fault.recovered_ms * 1e-3 + kRecover_s + landing_s : kGenerous_s;
   const TimeNs until_ns = rt::now() + from_seconds(patience_s);
   const auto answered = [&] {
     if (!shares(plan_.phase) || fault.promise == Promise::kEnds) return !flight_.running();
-    if (fault.promise != Promise::kGuardian) return flight_.settled(plan_.phase);
+    if (fault.promise != Promise::kGuardian) return flight_.commanded(plan_.phase);
     return cell.phase == Phase::kIdle ? flight_.watch().counts().incarnation > 0 : !flight_.running();
   };
   while (rt::now() < until_ns && flight_.running() && !interrupted_() && !answered())
@@ -118,7 +118,7 @@ std::string SharedFlight::outcome() {
   if (code) return *code == 0 ? "flown to its end" : fmt::format("ended, code {}", *code);
   const FlightCounts counts = flight_.watch().counts();
   if (counts.incarnation > 0) return "started again";
-  return flight_.settled(plan_.phase) ? "goes on" : "flies on otherwise";
+  return flight_.commanded(plan_.phase) ? "goes on" : "flies on otherwise";
 }
 
 WireEvidence SharedFlight::evidence() const {

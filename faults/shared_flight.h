@@ -30,7 +30,7 @@ class SharedFlight {
   };
   bool sleep_until(TimeNs until_ns);
   Done try_cell(const Cell& cell);
-  void wait_for_answer(const Cell& cell, Done& done);
+  void wait_for_answer(const Cell& cell);
   [[nodiscard]] std::string outcome();
   std::vector<CellResult> judge();
   CellResult judge(const Done& done, const std::vector<Violation>& violations,
