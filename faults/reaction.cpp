@@ -73,7 +73,7 @@ std::optional<Breach> late(const Fault& fault, const Reaction& r, bool times) {
         Bar{"recovered", fault.recovered_ms, r.recovered_ms}}) {
     if (bar.limit_ms <= 0) continue;
     if (!bar.measured_ms) return Breach{fmt::format("not {}", bar.name), kNotExplained};
-    if (times && *bar.measured_ms > bar.limit_ms)
+    if (times && *bar.measured_ms > bar.limit_ms + 1e-3)
       return Breach{fmt::format("{} after {:.1f} ms, promised {:.0f}", bar.name, *bar.measured_ms, bar.limit_ms),
                     *bar.measured_ms - bar.limit_ms};
   }

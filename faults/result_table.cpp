@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <nlohmann/json.hpp>
+#include <span>
 
 #include "control/flight_mode.h"
 #include "faults/catalogue.h"
@@ -45,7 +47,8 @@ std::string table_foot(const std::vector<CellResult>& results) {
   std::string text;
   for (const CellResult& r : results) {
     ++counts[static_cast<std::size_t>(r.verdict)];
-    for (const Violation& v : r.violations)
+    constexpr std::size_t kMost = 5;  // of a cell; the JSON file has all
+    for (const Violation& v : std::span(r.violations).first(std::min(kMost, r.violations.size())))
       text += fmt::format("  {} {}: {} at {:.6f} s, {:.4g}, {}\n", r.cell.fault->id, name_of(r.cell.phase),
                           name_of(v.offence), to_seconds(v.at_ns), v.value, v.bytes);
   }
@@ -73,8 +76,11 @@ std::string to_json(const std::vector<CellResult>& results, const Abilities& abi
   for (const CellResult& r : results) {
     nlohmann::json violations = nlohmann::json::array();
     for (const Violation& v : r.violations)
-      violations.push_back(
-          {{"offence", name_of(v.offence)}, {"at_ns", v.at_ns}, {"value", v.value}, {"bytes", v.bytes}});
+      violations.push_back({{"offence", name_of(v.offence)},
+                            {"at_ns", v.at_ns},
+                            {"value", v.value},
+                            {"held_ms", v.held_ms},
+                            {"bytes", v.bytes}});
     cells.push_back({{"fault", r.cell.fault->id},
                      {"class", r.cell.fault->class_number},
                      {"phase", name_of(r.cell.phase)},
@@ -89,6 +95,7 @@ std::string to_json(const std::vector<CellResult>& results, const Abilities& abi
                      {"records_lost", r.records_lost},
                      {"verdict", name_of(r.verdict)},
                      {"why", r.why},
+                     {"folder", r.folder.string()},
                      {"violations", violations}});
   }
   return nlohmann::json({{"host", rt::host_description()},

@@ -155,11 +155,11 @@ std::vector<CellResult> SharedFlight::judge() {
   const std::vector<Violation> violations = check_wire(flight_.wire(), limits, evidence());
   const std::vector<tools::Wakeup> reference = flight_.reference();
   std::vector<CellResult> results;
-  for (const Done& d : done_) results.push_back(judge(d, violations, reference));
+  for (const Done& d : done_) results.push_back(judge(d, limits, violations, reference));
   return results;
 }
 
-CellResult SharedFlight::judge(const Done& d, const std::vector<Violation>& violations,
+CellResult SharedFlight::judge(const Done& d, const WireLimits& limits, const std::vector<Violation>& violations,
                                const std::vector<tools::Wakeup>& reference) {
   const Fault& fault = *d.cell.fault;
   CellResult r{.cell = d.cell, .verdict = Verdict::kOk, .why = {}, .outcome = d.outcome};
@@ -175,29 +175,39 @@ CellResult SharedFlight::judge(const Done& d, const std::vector<Violation>& viol
   }
   if (fault.promise == Promise::kGuardian) read_restart(flight_.watch().commands(), d.trial, r.reaction);
   const bool only = done_.size() == 1;
-  const bool last = d.trial.began_ns == done_.back().trial.began_ns;
-  const auto belongs = [&](const Violation& v) {
-    return only || (v.at_ns >= d.trial.began_ns && (last || v.at_ns <= d.trial.watched_until_ns + kSecond));
-  };
+  TimeNs next_ns = kForever;
+  for (const Done& other : done_)
+    if (other.trial.began_ns > d.trial.began_ns) next_ns = std::min(next_ns, other.trial.began_ns);
+  const auto belongs = [&](const Violation& v) { return only || (v.at_ns >= d.trial.began_ns && v.at_ns < next_ns); };
   std::ranges::copy_if(violations, std::back_inserter(r.violations), belongs);
 
-  const DurationNs late_ns =
+  DurationNs late_ns =
       fault.noisy ? 0 : reference_late_ns(reference, d.trial.began_ns - kSecond, d.trial.watched_until_ns);
+  for (const Stretch& stall : flight_.tap().stalls())  // our own lateness is nobody's fault
+    if (stall.until_ns > d.trial.began_ns && stall.from_ns < d.trial.watched_until_ns)
+      late_ns += stall.until_ns - stall.from_ns;
   const auto blame = [&](const std::string& why, double excess) {
-    const bool noise = excess <= to_seconds(late_ns) * 1e3 + 1;
-    const Verdict verdict = noise && late_ns > 0 ? Verdict::kHostNoise : Verdict::kMiss;
+    const bool noise = excess < 0 || (late_ns > 0 && excess <= to_seconds(late_ns) * 1e3 + 1);
+    const Verdict verdict = noise ? Verdict::kHostNoise : Verdict::kMiss;
     if (r.verdict == Verdict::kMiss) return;
     r.verdict = verdict;
-    r.why = noise && late_ns > 0 ? fmt::format("{} (reference late {:.1f} ms)", why, to_seconds(late_ns) * 1e3) : why;
+    r.why = noise && excess >= 0
+                ? fmt::format("{} (reference or tap late by {:.1f} ms)", why, to_seconds(late_ns) * 1e3)
+                : why;
   };
   constexpr double kNotExplained = std::numeric_limits<double>::infinity();
   if (!d.error.empty()) blame(d.error, kNotExplained);
   if (const auto breach = breach_of(fault, d.cell.phase, r.reaction, options_.times))
     blame(breach->why, breach->excess_ms);
   for (const Violation& v : r.violations)
-    blame(fmt::format("{} on the wire ({:.3g})", name_of(v.offence), v.value), excess_ms(v, limits_of(plan_)));
+    if (const double excess = excess_ms(v, limits); excess <= v.held_ms)
+      blame(fmt::format("{} on the wire ({:.3g}), held by the line", name_of(v.offence), v.value), -1);
+    else
+      blame(fmt::format("{} on the wire ({:.3g})", name_of(v.offence), v.value), excess);
   const bool may_end = final(fault) || !shares(plan_.phase);
   if (!may_end && d.outcome != "goes on") blame("the flight did not go on: " + d.outcome, kNotExplained);
+  if (d.counts.incarnation > 0 && fault.promise != Promise::kGuardian)
+    blame("the flight process died and was started again", kNotExplained);
   if (d.crashed && fault.id != "guardian-killed") blame("crashed: " + d.outcome, kNotExplained);
   if (!fault.says.empty() && answers_in(fault, d.cell.phase)) {
     const bool said = std::ranges::any_of(log, [&](const LogLine& l) {

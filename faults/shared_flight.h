@@ -33,7 +33,7 @@ class SharedFlight {
   void wait_for_answer(const Cell& cell);
   [[nodiscard]] std::string outcome();
   std::vector<CellResult> judge();
-  CellResult judge(const Done& done, const std::vector<Violation>& violations,
+  CellResult judge(const Done& done, const WireLimits& limits, const std::vector<Violation>& violations,
                    const std::vector<tools::Wakeup>& reference);
   [[nodiscard]] WireEvidence evidence() const;
 

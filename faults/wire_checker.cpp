@@ -20,6 +20,7 @@ class Checker {
       : wire_(wire), limits_(limits), evidence_(evidence) {}
 
   std::vector<Violation> run() {
+    joined_ = join(wire_.setpoints, evidence_.commands);
     for (const Setpoint& s : wire_.setpoints) numbers(s);
     resends();
     gaps();
@@ -31,7 +32,14 @@ class Checker {
 
  private:
   void report(Offence offence, TimeNs at_ns, double value, const Setpoint* s = nullptr) {
-    found_.push_back({offence, at_ns, value, s == nullptr ? "" : fmt::format("{:02x}", fmt::join(s->wire, ""))});
+    found_.push_back({offence, at_ns, value, s == nullptr ? "" : fmt::format("{:02x}", fmt::join(s->wire, "")),
+                      s == nullptr ? 0 : held_ms(*s)});
+  }
+  [[nodiscard]] double held_ms(const Setpoint& s) const {
+    const int command = joined_[static_cast<std::size_t>(&s - wire_.setpoints.data())];
+    if (command < 0) return 0;
+    const TimeNs written_ns = evidence_.commands[static_cast<std::size_t>(command)].written_at_ns;
+    return written_ns == 0 ? 0 : std::max(0.0, to_seconds(s.at_ns - written_ns) * 1e3);
   }
 
   void numbers(const Setpoint& s) {
@@ -86,12 +94,12 @@ class Checker {
   }
 
   void evidence() {
-    const std::vector<int> commands = join(wire_.setpoints, evidence_.commands);
+    const std::vector<int>& commands = joined_;
     const TimeNs first_ns = evidence_.commands.front().released_at_ns,
                  last_ns = evidence_.commands.back().released_at_ns;
     for (std::size_t i = 0; i < commands.size(); ++i) {
       const Setpoint& s = wire_.setpoints[i];
-      if (s.at_ns < first_ns || s.at_ns > last_ns) continue;
+      if (s.at_ns < first_ns || s.at_ns > last_ns + limits_.period_ns / 2) continue;
       if (commands[i] >= 0)
         rests_on(s, evidence_.commands[static_cast<std::size_t>(commands[i])].exposed_at_ns);
       else if (!within(evidence_.not_joined, s.at_ns))
@@ -113,6 +121,7 @@ class Checker {
   const WireReader& wire_;
   const WireLimits& limits_;
   const WireEvidence& evidence_;
+  std::vector<int> joined_;
   std::vector<Violation> found_;
 };
 

@@ -43,6 +43,9 @@ struct Violation {
   TimeNs at_ns = 0;
   double value = 0;   ///< how much: rad, 1, ms
   std::string bytes;  ///< hex of the setpoint
+  /// Gaps and ages: how long the line held the setpoint back, from the flight's own "written" to our time stamp; a
+  /// pseudo-terminal is emptied by an ordinary kernel thread.
+  double held_ms = 0;
 };
 
 struct WireEvidence {

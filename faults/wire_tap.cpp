@@ -13,6 +13,7 @@ namespace {
 
 constexpr int kPriority = 90;  // above all of the flight: what it times is the line
 constexpr DurationNs kTurn = 2 * kMillisecond;
+constexpr DurationNs kStall = 5 * kMillisecond;
 
 rt::Thread start(std::function<void()> body) {
   rt::ThreadSpec spec{.name = "tap", .policy = rt::Policy::kFifo, .priority = kPriority, .core = 0};
@@ -60,6 +61,11 @@ void WireTap::inject(Direction direction, std::vector<std::uint8_t> bytes) {
   write(direction, bytes);
 }
 
+std::vector<Stretch> WireTap::stalls() const {
+  const std::scoped_lock lock(mutex_);
+  return stalls_;
+}
+
 void WireTap::run() {
   while (!stop_.load(std::memory_order_relaxed)) turn();
 }
@@ -70,10 +76,12 @@ void WireTap::turn() {
     const std::scoped_lock lock(mutex_);
     if (flight_) fds[1].fd = flight_->fd();
   }
+  const TimeNs from_ns = rt::now();
   const timespec patience = rt::to_timespec(kTurn);
   ppoll(fds.data(), fds.size(), &patience, nullptr);
   const TimeNs now_ns = rt::now();
   const std::scoped_lock lock(mutex_);
+  if (now_ns - from_ns > kStall) stalls_.push_back({from_ns, now_ns});
   if ((fds[1].revents & POLLIN) != 0 && flight_)
     if (const auto bytes = flight_->read(); !bytes.empty()) pass(Direction::kToAutopilot, bytes, now_ns);
   if ((fds[0].revents & POLLIN) != 0) {

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "drivers/serial_port.h"
+#include "faults/stretch.h"
 #include "faults/wire_fault.h"
 #include "rt/thread.h"
 #include "sim/pty.h"
@@ -35,6 +36,8 @@ class WireTap {
   /// Writes bytes in between.
   void inject(Direction direction, std::vector<std::uint8_t> bytes);
   [[nodiscard]] const WireLog& log() const { return log_; }
+  /// When this thread itself did not run for more than 5 ms: what arrived then bears too late a time.
+  [[nodiscard]] std::vector<Stretch> stalls() const;
 
  private:
   struct Stage {
@@ -49,10 +52,11 @@ class WireTap {
   std::string link_path_;
   drivers::SerialPort autopilot_;
   WireLog log_;
-  std::mutex mutex_;  ///< all below
+  mutable std::mutex mutex_;  ///< all below
   std::unique_ptr<sim::Pty> flight_;
   std::vector<Stage> stages_;
   int next_number_ = 1;
+  std::vector<Stretch> stalls_;
   std::atomic<bool> stop_{false};
   rt::Thread thread_;  // joined first
 };
