@@ -38,6 +38,7 @@ constexpr const char* kUsage =
     "  eval     run one vision kernel over a folder of recordings\n"
     "  iceoryx  export topics to iceoryx, or import a camera from it\n"
     "  bench    benchmarks: latency, ipc, vision, micro\n"
+    "  faults   every fault of the catalogue done to flights in the simulator, judged on the serial line\n"
     "  rt-guest the flight on a PREEMPT_RT kernel in an emulator, on virtual time\n";
 
 int run_sister(const char* name, char** argv) {

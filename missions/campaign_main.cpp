@@ -9,7 +9,7 @@
 #include <stdexcept>
 
 #include "missions/campaign.h"
-#include "missions/progress_line.h"
+#include "tools/progress_line.h"
 #include "missions/run_figures.h"
 
 namespace {
@@ -77,7 +77,7 @@ int run(const Options& o) {
     return 0;
   }
   if (!o.out.empty()) fs::create_directories(o.out);
-  ProgressLine line(o.campaign.mission);
+  tools::ProgressLine line(o.campaign.mission);
   const auto progress = [&](const CampaignProgress& p) { line.show(progress_text(p), p.done == p.runs); };
   RunFigures figures(o.campaign.mission);
   const CampaignResult result =

@@ -9,7 +9,7 @@
 #include <iostream>
 #include <stdexcept>
 
-#include "missions/progress_line.h"
+#include "tools/progress_line.h"
 #include "missions/reproduce.h"
 #include "rt/process.h"
 #include "tools/edge_study.h"
@@ -52,7 +52,7 @@ ExperimentResult fly_experiment(const Experiment& e, const Options& o) {
   ExperimentResult result;
   result.experiment = &e;
   RunFigures figures(e.mission);
-  ProgressLine line(e.mission);
+  tools::ProgressLine line(e.mission);
   CampaignOptions campaign{e.mission, o.quick ? e.quick_runs : e.runs, o.seed, o.jobs, {}};
   result.campaign = fly_campaign(
       campaign, [&](const CampaignProgress& p) { line.show(progress_text(p), p.done == p.runs); },
@@ -73,7 +73,7 @@ ExperimentResult study_edges(const Options& o) {
                                  "under-estimates height with less variance."};
   tools::EdgeStudyOptions options;
   if (o.quick) options.seeds = 3, options.climbs = 2;
-  ProgressLine line("edges");
+  tools::ProgressLine line("edges");
   options.progress = [&](int done, int of) { line.show(fmt::format("{} of {} images", done, of), done == of); };
   const tools::EdgeStudy study = tools::run_edge_study(options);
   tools::write_edge_study(study, o.out);

@@ -30,7 +30,8 @@ namespace {
 
 constexpr double kReplayTail_s = 0.3;  // the last frames' cues reach a command before the replay ends
 
-void log(const std::string& text) { std::fprintf(stderr, "%10.3f  %s\n", to_seconds(rt::now()), text.c_str()); }
+void log_at(TimeNs at_ns, const char* text) { std::fprintf(stderr, "%10.3f  %s\n", to_seconds(at_ns), text); }
+void log(const std::string& text) { log_at(rt::now(), text.c_str()); }
 
 /// Blocks the signals that end a flight, for every thread made from here on; the main thread takes them in turn.
 sigset_t block_signals() {
@@ -291,7 +292,7 @@ class Flight {
   void drain_events() {
     Event e;
     for (EventQueue* queue : {&control_events_, &link_events_, &relay_events_})
-      while (queue->take(e)) log(e.text.data());
+      while (queue->take(e)) log_at(e.at_ns, e.text.data());  // when it was said, not when it is printed
   }
 
   void supervise(const sigset_t& signals) {

@@ -10,8 +10,10 @@ namespace {
 constexpr std::uint8_t kSystem = 1, kComponent = 1;
 constexpr std::uint64_t kTicksPerSecond = 200;
 constexpr std::size_t kMaxQueued = 64 * 1024;
-constexpr std::uint16_t kCommandSetMode = 176, kCommandArm = 400;
-constexpr float kForce = 21196.f;
+constexpr std::uint16_t kCommandSetMode = 176, kCommandReboot = 246, kCommandArm = 400, kCommandFailure = 420,
+                        kCommandClockStep = 31010;
+constexpr float kForce = 21196.f, kForceReboot = 20190226.f;
+constexpr DurationNs kRebootTime = 1500 * kMillisecond;
 constexpr std::uint8_t kIgnoreYawRate = 4, kIgnoreThrust = 64, kIgnoreAttitude = 128;
 
 bool for_us(std::uint8_t system, std::uint8_t component) {
@@ -60,27 +62,55 @@ void AutopilotLink::receive(std::span<const std::uint8_t> bytes, TimeNs now_ns) 
 }
 
 void AutopilotLink::handle(const mavlink::Frame& frame, TimeNs now_ns) {
+  if (now_ns < silent_until_ns_) return;  // what came behind the command to restart
   ++frames_received_;
-  if (frame.is<mavlink::CommandLong>()) on_command(frame.as<mavlink::CommandLong>(), frame);
+  if (frame.is<mavlink::CommandLong>()) on_command(frame.as<mavlink::CommandLong>(), frame, now_ns);
   if (frame.is<mavlink::SetAttitudeTarget>()) on_setpoint(frame.as<mavlink::SetAttitudeTarget>(), now_ns);
   if (frame.is<mavlink::Timesync>()) on_timesync(frame.as<mavlink::Timesync>(), frame, now_ns);
 }
 
-void AutopilotLink::on_command(const mavlink::CommandLong& command, const mavlink::Frame& frame) {
-  if (!for_us(command.target_system, command.target_component)) return;
-  CommandResult result = CommandResult::kUnsupported;
-  if (command.command == kCommandArm) {
-    result = flight_.arm(command.param1 > 0.5f, command.param2 == kForce);
-  } else if (command.command == kCommandSetMode) {
-    const bool known = command.param1 >= 1 && command.param2 >= 0 && command.param2 < 256;  // NaN fails
-    result = known ? flight_.set_mode(static_cast<std::uint32_t>(command.param2)) : CommandResult::kDenied;
+CommandResult AutopilotLink::obey(const mavlink::CommandLong& command, TimeNs now_ns) {
+  switch (command.command) {
+    case kCommandArm:
+      return flight_.arm(command.param1 > 0.5f, command.param2 == kForce);
+    case kCommandSetMode: {
+      const bool known = command.param1 >= 1 && command.param2 >= 0 && command.param2 < 256;  // NaN fails
+      return known ? flight_.set_mode(static_cast<std::uint32_t>(command.param2)) : CommandResult::kDenied;
+    }
+    case kCommandReboot:
+      return reboot(command, now_ns);
+    case kCommandFailure:
+      return failures_.set(command.param1, command.param2) ? CommandResult::kAccepted : CommandResult::kUnsupported;
+    case kCommandClockStep:
+      if (!(std::abs(command.param1) <= 1e9f)) return CommandResult::kDenied;
+      clock_offset_ns_ += from_seconds(static_cast<double>(command.param1));
+      return CommandResult::kAccepted;
+    default:
+      return CommandResult::kUnsupported;
   }
+}
+
+CommandResult AutopilotLink::reboot(const mavlink::CommandLong& command, TimeNs now_ns) {
+  if (command.param1 != 1.f) return CommandResult::kUnsupported;
+  if (flight_.armed() && command.param6 != kForceReboot) return CommandResult::kDenied;
+  flight_.restart();
+  failures_ = SensorFailures();
+  clock_offset_ns_ = -now_ns;
+  ticks_ = 0;  // a heartbeat first
+  silent_until_ns_ = now_ns + kRebootTime;
+  return CommandResult::kAccepted;
+}
+
+void AutopilotLink::on_command(const mavlink::CommandLong& command, const mavlink::Frame& frame, TimeNs now_ns) {
+  if (!for_us(command.target_system, command.target_component)) return;
+  const CommandResult result = obey(command, now_ns);
   mavlink::CommandAck ack{};
   ack.command = command.command;
   ack.result = static_cast<std::uint8_t>(result);
   ack.target_system = frame.system_id;
   ack.target_component = frame.component_id;
   send(ack);
+  if (now_ns < silent_until_ns_) return;
   send_heartbeat();  // the new state at once, not within a second
 }
 
@@ -104,6 +134,7 @@ void AutopilotLink::on_timesync(const mavlink::Timesync& sync, const mavlink::Fr
 }
 
 void AutopilotLink::step(const ImuSample& imu, TimeNs now_ns) {
+  if (now_ns < silent_until_ns_) return;
   send_imu(imu, now_ns);
   if (ticks_ % 2 == 0) send_attitude(now_ns);
   if (ticks_ % kTicksPerSecond == 0) send_heartbeat();

@@ -1,7 +1,9 @@
 // The autopilot's side of the serial line: MAVLink 2 as system 1, component 1. Sends HEARTBEAT 1 Hz,
 // ATTITUDE_QUATERNION 100 Hz, HIGHRES_IMU 200 Hz, its own TIMESYNC requests 1 Hz, STATUSTEXT on events; answers
-// TIMESYNC; obeys COMMAND_LONG 400 (arm) and 176 (mode), acknowledges every command; follows SET_ATTITUDE_TARGET. Its
-// clock runs at an offset from the simulator's, so that a companion must synchronise.
+// TIMESYNC; obeys COMMAND_LONG 400 (arm), 176 (mode), 246 (reboot: disarmed, 1.5 s of silence, its clock starts again;
+// denied while armed unless param6 is 20190226, as ArduPilot does), 420 (sensor failures, as PX4's simulation) and
+// 31010 (MAV_CMD_USER_1: its clock jumps by param1 seconds); acknowledges every command; follows SET_ATTITUDE_TARGET.
+// Its clock runs at an offset from the simulator's, so that a companion must synchronise.
 #pragma once
 
 #include <cstdint>
@@ -11,6 +13,7 @@
 #include "messages/mavlink_frame.h"
 #include "messages/mavlink_messages.h"
 #include "sim/flight_controller.h"
+#include "sim/sensor_failures.h"
 
 namespace wasp::sim {
 
@@ -23,6 +26,8 @@ class AutopilotLink {
   void receive(std::span<const std::uint8_t> bytes, TimeNs now_ns);
   /// Once for every IMU sample (200 Hz): queues what is due.
   void step(const ImuSample& imu, TimeNs now_ns);
+  /// What is wrong with the sensors, on command: to be applied to a sample before anybody reads it.
+  [[nodiscard]] SensorFailures& failures() { return failures_; }
   /// Moves the queued bytes to the end of `out`. At most 64 KiB wait; older output is dropped when nobody drains.
   void drain(std::vector<std::uint8_t>& out);
 
@@ -32,7 +37,9 @@ class AutopilotLink {
 
  private:
   void handle(const mavlink::Frame& frame, TimeNs now_ns);
-  void on_command(const mavlink::CommandLong& command, const mavlink::Frame& frame);
+  void on_command(const mavlink::CommandLong& command, const mavlink::Frame& frame, TimeNs now_ns);
+  CommandResult obey(const mavlink::CommandLong& command, TimeNs now_ns);
+  CommandResult reboot(const mavlink::CommandLong& command, TimeNs now_ns);
   void on_setpoint(const mavlink::SetAttitudeTarget& target, TimeNs now_ns);
   void on_timesync(const mavlink::Timesync& sync, const mavlink::Frame& frame, TimeNs now_ns);
   void send_heartbeat();
@@ -47,6 +54,8 @@ class AutopilotLink {
   DurationNs clock_offset_ns_, companion_offset_ns_ = 0;
   mavlink::Encoder encoder_{1, 1};
   mavlink::Parser parser_;
+  SensorFailures failures_;
+  TimeNs silent_until_ns_ = kNever;  ///< starting again
   std::vector<std::uint8_t> output_;
   std::uint64_t ticks_ = 0, frames_received_ = 0;
 };

@@ -32,6 +32,8 @@ class FlightController {
   void set_setpoint(const AttitudeSetpoint& setpoint, TimeNs now_ns);
   /// Disarming in flight needs `force`; arming needs a settled estimate and ground under the legs.
   CommandResult arm(bool armed, bool force);
+  /// As after power-up: disarmed, manual, nothing estimated. In the air the vehicle falls.
+  void restart() { *this = FlightController(params_); }
   CommandResult set_mode(std::uint32_t custom_mode);
   /// Small corrections a safety pilot adds to the companion's roll and pitch [rad] and yaw rate [rad/s].
   void set_trim(float roll_rad, float pitch_rad, float yaw_rate_radps = 0) {

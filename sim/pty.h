@@ -28,6 +28,8 @@ class Pty {
   /// Sends `bytes`, or drops all of them while earlier ones still wait. Split messages never reach the line.
   void write(std::span<const std::uint8_t> bytes);
 
+  /// To poll.
+  [[nodiscard]] int fd() const { return master_; }
   [[nodiscard]] const std::string& slave_path() const { return slave_path_; }
   [[nodiscard]] std::uint64_t dropped_bytes() const { return dropped_bytes_; }
 

@@ -14,6 +14,7 @@
 #include "shm/topics.h"
 #include "sim/camera_part.h"
 #include "sim/owned_region.h"
+#include "sim/truth_feed.h"
 #include "sim/vehicle_loop.h"
 
 namespace {
@@ -25,14 +26,14 @@ struct Options {
   std::string instance = "wasp", tty_link, config_path, world_kind, world_file;
   std::optional<std::uint32_t> seed;
   std::optional<double> rate_hz;
-  bool no_camera = false, no_safety_pilot = false;
+  bool no_camera = false, camera_only = false, no_safety_pilot = false;
   double seconds = 0;
 };
 
 void declare(CLI::App& app, Options& o) {
   app.add_option("--instance", o.instance, "name of the shared memory regions: wasp.NAME.camera, wasp.NAME.truth")
       ->capture_default_str();
-  app.add_option("--tty-link", o.tty_link, "symbolic link to make to the autopilot's serial line")->required();
+  app.add_option("--tty-link", o.tty_link, "symbolic link to make to the autopilot's serial line");
   app.add_option("--config", o.config_path, "TOML file; see share/wasp/config/sim.toml for every key");
   app.add_option("--world", o.world_file, "VRML97 file to fly in (`wasp world make`); default: world.kind")
       ->check(CLI::ExistingFile);
@@ -42,7 +43,12 @@ void declare(CLI::App& app, Options& o) {
   app.add_option("--seed", o.seed, "seed of world, sensors and vehicle (default: run.seed of the configuration)");
   app.add_option("--rate-hz", o.rate_hz, "camera rate (default: camera.rate_hz of the configuration)")
       ->check(CLI::Range(1.0, 120.0));
-  app.add_flag("--no-camera", o.no_camera, "autopilot and truth only");
+  auto* no_camera = app.add_flag("--no-camera", o.no_camera, "autopilot and truth only");
+  app.add_flag(
+         "--camera-only", o.camera_only,
+         "the camera alone, looking from the vehicle of another wasp-sim --no-camera of the same instance; killed "
+         "and started again it goes on in the same region")
+      ->excludes(no_camera);
   app.add_flag(
       "--no-safety-pilot", o.no_safety_pilot,
       "do not hold the vehicle over its place: without this flag a small slow trim (at most 3 degrees, from the "
@@ -88,6 +94,23 @@ void wait_for_end(const sigset_t& signals, double seconds) {
   }
 }
 
+/// The camera as a process of its own.
+void run_camera(const Options& options, const sigset_t& signals) {
+  CameraPart camera(settings(options), options.instance);
+  TruthFeed feed(options.instance, 60);
+  auto poses = std::make_unique<PoseQueue>();
+  std::atomic<bool> stop{false};
+  rt::Thread feed_thread({.name = "truth", .core = rt::nearest_usable_core(0)}, [&] { feed.run(*poses, stop); });
+  camera.start(rt::now() + 10 * kMillisecond, *poses, stop);
+  std::printf("wasp-sim: instance %s, camera only\n", options.instance.c_str());
+  std::fflush(stdout);
+  wait_for_end(signals, options.seconds);
+  stop.store(true);
+  camera.join();
+  feed_thread.join();
+  std::printf("wasp-sim: %s\n", camera.summary().c_str());
+}
+
 void run(const Options& options, const sigset_t& signals) {
   const SimConfig config = settings(options);
   std::optional<CameraPart> camera;
@@ -127,7 +150,12 @@ int main(int argc, char** argv) {
   sigaddset(&signals, SIGTERM);
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
   try {
-    run(options, signals);
+    if (options.camera_only) {
+      run_camera(options, signals);
+    } else {
+      if (options.tty_link.empty()) throw std::runtime_error("--tty-link is required");
+      run(options, signals);
+    }
   } catch (const std::exception& error) {
     std::fprintf(stderr, "wasp-sim: %s\n", error.what());
     return 1;

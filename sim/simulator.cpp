@@ -47,7 +47,8 @@ void Simulator::control_tick() {
   const VehicleState& state = vehicle_.state();
   const bool flies = stand_.turntable ? flight_.armed() : !state.on_ground;
   if (flies && took_off_ns_ == kNever) took_off_ns_ = now_ns_;
-  const ImuSample imu = imu_.sample(state, to_seconds(kControlPeriod_ns), now_ns_);
+  ImuSample imu = imu_.sample(state, to_seconds(kControlPeriod_ns), now_ns_);
+  link_.failures().apply(imu);
   const AttitudeSetpoint commanded = flight_.descending() ? AttitudeSetpoint{} : flight_.setpoint();
   const PilotTrim trim = pilot_.step(state, commanded, flight_.armed() && !state.on_ground);
   flight_.set_trim(trim.roll_rad, trim.pitch_rad, trim.yaw_rate_radps);

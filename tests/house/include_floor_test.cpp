@@ -26,6 +26,7 @@ const std::map<std::string, std::set<std::string>> kMayInclude = {
     {"tools", {"types", "rt", "shm", "messages", "drivers", "vision", "control", "scheduling", "sim"}},
     {"benchmarks", {"types", "rt", "shm", "messages", "drivers", "vision", "control", "scheduling", "sim", "tools"}},
     {"missions", {"types", "rt", "shm", "messages", "drivers", "vision", "control", "scheduling", "sim", "tools"}},
+    {"faults", {"types", "rt", "shm", "messages", "drivers", "vision", "control", "scheduling", "sim", "tools"}},
 };
 
 /// Violations in one file, as "file includes folder".

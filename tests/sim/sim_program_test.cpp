@@ -6,6 +6,7 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 
 #include "messages/mavlink_frame.h"
 #include "rt/clock.h"
@@ -153,6 +154,45 @@ TEST(SimProgram, SpeaksMavlinkOnTheLineAndItSurvivesReopening) {
         << round;
     close(fd);
   }
+}
+
+TEST(SimProgram, AKilledCameraComesBackIntoTheSameRegionAndItsReadersGoOn) {
+  Program vehicle({"--no-camera"});
+  ASSERT_TRUE(vehicle.ready());
+  const std::string config = testing::TempDir() + test::unique_name("alone") + ".toml";
+  std::ofstream(config) << "[camera]\nwidth_px = 64\nheight_px = 48\n";
+  const auto start = [&] {
+    return test::start_child([&] {
+      execl(WASP_BINARY_DIR "/wasp-sim", "wasp-sim", "--camera-only", "--instance", vehicle.instance.c_str(),
+            "--config", config.c_str(), nullptr);
+      return 127;
+    });
+  };
+  const std::string name = shm::camera_region(vehicle.instance);
+  pid_t camera = start();
+  ASSERT_TRUE(test::eventually([&] { return access(("/dev/shm/" + name).c_str(), R_OK) == 0; }));
+  std::optional<shm::Region> region;
+  ASSERT_TRUE(test::eventually([&] {
+    try {
+      region.emplace(shm::Region::attach_with_bells(name));
+    } catch (const std::exception&) {
+    }
+    return region.has_value();
+  }));
+  shm::RingReader gray(*region, shm::kGray, "Frame");
+  ASSERT_TRUE(gray.wait(rt::now() + 60 * kSecond));
+  const TimeNs first_ns = header_of(gray.next()).exposed_at_ns;
+  test::kill_and_wait(camera, SIGKILL);
+  EXPECT_FALSE(region->writer_alive());
+  while (gray.next()) {
+  }
+  camera = start();
+  ASSERT_TRUE(gray.wait(rt::now() + 60 * kSecond)) << "the reader's mapping is still the camera's";
+  EXPECT_GT(header_of(gray.next()).exposed_at_ns, first_ns);
+  EXPECT_EQ(region->header().writer_restarts.load(), 1u);
+  const int status = test::kill_and_wait(camera, SIGTERM);
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0);
+  std::filesystem::remove(config);
 }
 
 TEST(SimProgram, EndsInOrderOnSigterm) {

@@ -125,6 +125,69 @@ TEST(Simulator, AcknowledgesCommandsAndReportsTheMode) {
   EXPECT_EQ(companion.sim.truth().armed, 1.f);
 }
 
+TEST(Simulator, RebootsOnCommandDisarmedSilentAndWithANewClock) {
+  Companion companion;
+  companion.take_off(1);
+  companion.command(246, 1);
+  companion.run(0.05);
+  EXPECT_EQ(companion.acks.back().result, 2) << "denied: it flies";
+  EXPECT_EQ(companion.sim.truth().armed, 1.f);
+  mavlink::CommandLong forced{};
+  forced.command = 246, forced.param1 = 1, forced.param6 = 20190226.f;
+  forced.target_system = forced.target_component = 1;
+  companion.send(forced);
+  companion.run(0.01);
+  EXPECT_EQ(companion.acks.back().result, 0);
+  EXPECT_EQ(companion.sim.truth().armed, 0.f);
+  companion.count.clear();
+  companion.run(1.4);
+  EXPECT_TRUE(companion.count.empty()) << "not a word while it starts";
+  companion.run(0.6);
+  EXPECT_GT(companion.count[mavlink::HighresImu::kId], 80);
+  EXPECT_EQ(companion.heartbeat.custom_mode, 0u);
+  EXPECT_EQ(companion.heartbeat.base_mode & 128, 0);
+  EXPECT_LT(companion.imu.time_usec, 2'100'000u) << "its clock began again";
+}
+
+TEST(Simulator, FailsSensorsOnCommandAndMendsThem) {
+  Companion companion;
+  const float pressure_hpa = 1013.25f;
+  companion.run(1);
+  companion.command(420, 3, 4);  // barometer, wrong
+  companion.run(0.1);
+  EXPECT_EQ(companion.acks.back().result, 0);
+  EXPECT_GT(companion.imu.abs_pressure, pressure_hpa + 0.8f);
+  companion.command(420, 3, 1);  // off
+  companion.run(0.1);
+  EXPECT_EQ(companion.imu.abs_pressure, 0.f);
+  EXPECT_EQ(companion.imu.fields_updated & 0x200, 0);
+  companion.command(420, 3, 0);
+  companion.command(420, 1, 3);  // accelerometer, garbage
+  companion.run(0.1);
+  EXPECT_NEAR(companion.imu.abs_pressure, pressure_hpa, 0.5f);
+  const float first = companion.imu.zacc;
+  companion.run(0.1);
+  EXPECT_GT(std::abs(companion.imu.zacc - first), 0.5f);
+  companion.command(420, 1, 2);  // stuck: at the last reading before the failures
+  companion.run(0.1);
+  EXPECT_NEAR(companion.imu.zacc, -9.81f, 0.5f);
+  const float stuck = companion.imu.xacc;
+  companion.run(0.1);
+  EXPECT_EQ(companion.imu.xacc, stuck);
+  companion.command(420, 100, 1);
+  companion.run(0.1);
+  EXPECT_EQ(companion.acks.back().result, 3) << "an engine: not simulated";
+}
+
+TEST(Simulator, ItsClockStepsOnCommand) {
+  Companion companion;
+  companion.run(1);
+  const std::uint64_t before_us = companion.imu.time_usec;
+  companion.command(31010, 3600);
+  companion.run(0.1);
+  EXPECT_NEAR(static_cast<double>(companion.imu.time_usec - before_us), 3600.1e6, 2e4);
+}
+
 TEST(Simulator, ItsClockHasAnOffsetThatTimesyncReveals) {
   SimConfig config;
   config.clock_offset_s = 500;

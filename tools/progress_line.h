@@ -9,7 +9,7 @@
 
 #include "rt/clock.h"
 
-namespace wasp::missions {
+namespace wasp::tools {
 
 class ProgressLine {
  public:
@@ -29,4 +29,4 @@ class ProgressLine {
   TimeNs shown_at_ns_ = kNever;
 };
 
-}  // namespace wasp::missions
+}  // namespace wasp::tools

@@ -1,0 +1,86 @@
+// One flight with all its processes, every one a child of ours: vehicle, camera, tap, recorder, flight. Gone with the
+// object, with every file in /dev/shm.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "faults/flight_plan.h"
+#include "faults/flight_watch.h"
+#include "faults/wire_reader.h"
+#include "faults/wire_tap.h"
+#include "tools/child_process.h"
+#include "tools/wakeup_loop.h"
+
+namespace wasp::faults {
+
+/// A line of the flight's (or guardian's) log.
+struct LogLine {
+  TimeNs at_ns = 0;
+  std::string text;
+};
+
+class FlightUnderTest {
+ public:
+  /// Starts everything. Throws std::runtime_error with what did not come up.
+  explicit FlightUnderTest(const FlightPlan& plan);
+  ~FlightUnderTest();
+  FlightUnderTest(const FlightUnderTest&) = delete;
+  FlightUnderTest& operator=(const FlightUnderTest&) = delete;
+
+  /// True once the flight is where the phase begins; false when it ended, or after `patience_s`.
+  bool wait_for(Phase phase, double patience_s);
+  /// Commanded by behaviours (idle: on the ground, disarmed), now.
+  [[nodiscard]] bool commanded(Phase phase);
+  /// Besides, where faults of the phase may begin.
+  [[nodiscard]] bool settled(Phase phase);
+  /// The flight process, or the guardian above it, still runs.
+  [[nodiscard]] bool running();
+  /// Its exit code, once it has ended.
+  std::optional<int> exit_code() { return flight_->poll(); }
+  /// Ends it in order (lands) or, when it does not within `patience_s`, by force.
+  int end(double patience_s);
+
+  /// Process of a name: "flight" (the one that flies, below a guardian), "guardian", "camera", "sim", "recorder";
+  /// -1: there is none.
+  [[nodiscard]] pid_t pid_of(std::string_view name) const;
+  /// Thread of the flight process by its name, -1: there is none.
+  [[nodiscard]] pid_t thread_of(std::string_view name) const;
+  /// Starts the camera (again).
+  void start_camera();
+  void start_recorder();
+  /// One request over the fault socket; its answer.
+  std::string ask_flight(const std::string& request);
+
+  /// What went over the wire until now.
+  const WireReader& wire();
+  [[nodiscard]] WireTap& tap() { return *tap_; }
+  [[nodiscard]] FlightWatch& watch() { return *watch_; }
+  [[nodiscard]] const FlightPlan& plan() const { return plan_; }
+  [[nodiscard]] std::vector<LogLine> log() const;
+  /// Messages the recorder says it lost; after end().
+  [[nodiscard]] std::uint64_t records_lost() const;
+  /// Wake-ups of the reference loop beside; after end().
+  std::vector<tools::Wakeup> reference();
+
+ private:
+  void wait_until_there(const std::string& path, tools::ChildProcess& by);
+
+  FlightPlan plan_;
+  std::optional<tools::ChildProcess> sim_, camera_, recorder_, flight_;
+  std::unique_ptr<WireTap> tap_;
+  std::unique_ptr<FlightWatch> watch_;
+  std::unique_ptr<tools::WakeupLoop> reference_;
+  WireReader wire_;
+  int held_ = 0;  ///< the tap's fault that keeps the flight on the ground
+};
+
+/// Process ids of the children of a process.
+std::vector<pid_t> children_of(pid_t pid);
+/// Thread ids of a process with their names.
+std::vector<std::pair<pid_t, std::string>> threads_of(pid_t pid);
+
+}  // namespace wasp::faults

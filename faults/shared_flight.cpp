@@ -1,0 +1,221 @@
+#include "faults/shared_flight.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <limits>
+
+#include "faults/injector.h"
+#include "rt/clock.h"
+#include "sim/random.h"
+
+namespace wasp::faults {
+namespace {
+
+constexpr double kReach_s = 60, kSettle_s = 20;                      // to the phase; back to it
+constexpr double kRecover_s = 4, kGenerous_s = 40, kLanding_s = 15;  // after a fault, with times judged and without
+constexpr double kAfterwards_s = 0.6;                                // watched after the recovery
+constexpr DurationNs kOverrun = kMillisecond;                        // of the reference loop: one of its periods
+constexpr float kCorridorEnd_m = 22.f;                               // of 30
+
+/// Promises after which the flight does not command any more.
+bool final(const Fault& fault) {
+  return fault.isolated || fault.promise == Promise::kGuardian || fault.promise == Promise::kEnds;
+}
+
+bool shares(Phase phase) { return phase == Phase::kIdle || phase == Phase::kHover || phase == Phase::kCruise; }
+
+DurationNs reference_late_ns(const std::vector<tools::Wakeup>& reference, TimeNs from_ns, TimeNs until_ns) {
+  DurationNs sum = 0;
+  for (const tools::Wakeup& w : reference)
+    if (w.due_at_ns + w.late_ns >= from_ns && w.due_at_ns <= until_ns && w.late_ns >= kOverrun) sum += w.late_ns;
+  return sum;
+}
+
+/// By how much a violation is beyond its bar; infinite where no delay of the host explains it.
+double excess_ms(const Violation& v, const WireLimits& limits) {
+  if (v.offence == Offence::kGap) return v.value - to_seconds(limits.longest_gap_ns) * 1e3;
+  if (v.offence == Offence::kOldEvidence) return v.value - to_seconds(limits.cue_age_ns) * 1e3;
+  return std::numeric_limits<double>::infinity();
+}
+
+}  // namespace
+
+SharedFlight::SharedFlight(const CampaignOptions& options, const FlightPlan& plan,
+                           const std::function<bool()>& interrupted)
+    : options_(options), plan_(plan), interrupted_(interrupted), flight_(plan_) {}
+
+/// False when the flight ended, or we were interrupted, before.
+bool SharedFlight::sleep_until(TimeNs until_ns) {
+  while (rt::now() < until_ns && flight_.running() && !interrupted_())
+    rt::sleep_until(std::min(until_ns, rt::now() + 10 * kMillisecond));
+  return rt::now() >= until_ns;
+}
+
+std::vector<CellResult> SharedFlight::fly(std::deque<Cell>& queue) {
+  const bool there = flight_.wait_for(plan_.phase, kReach_s);
+  if (!there) {
+    CellResult result{.cell = queue.front(), .verdict = Verdict::kMiss, .why = "the flight never came so far"};
+    if (const auto log = flight_.log(); !log.empty()) result.why += ": " + log.back().text;
+    result.folder = plan_.folder;
+    queue.pop_front();
+    return {result};
+  }
+  do {
+    const Cell cell = queue.front();
+    if (!done_.empty() && plan_.phase == Phase::kCruise && flight_.watch().truth().position_ned_m[0] > kCorridorEnd_m)
+      break;  // the end of the corridor
+    queue.pop_front();
+    done_.push_back(try_cell(cell));
+    if (final(*cell.fault) || options_.isolate || !shares(plan_.phase)) break;
+    const TimeNs patience_ns = rt::now() + from_seconds(kSettle_s);
+    while (!flight_.settled(plan_.phase) && flight_.running() && rt::now() < patience_ns && !interrupted_())
+      rt::sleep_until(rt::now() + 10 * kMillisecond);
+  } while (!queue.empty() && flight_.settled(plan_.phase) && !interrupted_());
+  flight_.end(shares(plan_.phase) ? 3 : 20);
+  return judge();
+}
+
+SharedFlight::Done SharedFlight::try_cell(const Cell& cell) {
+  sim::Random random(sim::mix(cell.seed, static_cast<std::uint32_t>(done_.size())));
+  sleep_until(rt::now() + from_seconds(random.uniform(0.0, 0.1)));  // anywhere between two control ticks
+  Done done{.cell = cell};
+  const Injected injected = inject(*cell.fault, flight_, random.bits());
+  done.trial.began_ns = injected.at_ns;
+  done.error = injected.error;
+  sleep_until(injected.at_ns + from_seconds(cell.fault->for_s));
+  done.trial.ended_ns = rt::now();
+  if (injected.undo) injected.undo();
+  if (done.error.empty()) wait_for_answer(cell);
+  done.outcome = outcome();
+  done.crashed = flight_.exit_code().value_or(0) >= 126;
+  done.trial.watched_until_ns = rt::now();
+  done.counts = flight_.watch().counts();
+  return done;
+}
+
+/// Until the fault is recovered from and a little longer, or patience is over.
+void SharedFlight::wait_for_answer(const Cell& cell) {
+  const Fault& fault = *cell.fault;
+  const double landing_s = final(fault) || !shares(plan_.phase) ? kLanding_s : 0;
+  const double patience_s = options_.times ? fault.recovered_ms * 1e-3 + kRecover_s + landing_s : kGenerous_s;
+  const TimeNs until_ns = rt::now() + from_seconds(patience_s);
+  const auto answered = [&] {
+    if (!shares(plan_.phase) || fault.promise == Promise::kEnds) return !flight_.running();
+    if (fault.promise != Promise::kGuardian) return flight_.commanded(plan_.phase);
+    return cell.phase == Phase::kIdle ? flight_.watch().counts().incarnation > 0 : !flight_.running();
+  };
+  while (rt::now() < until_ns && flight_.running() && !interrupted_() && !answered())
+    rt::sleep_until(rt::now() + 10 * kMillisecond);
+  sleep_until(rt::now() + from_seconds(kAfterwards_s));
+}
+
+std::string SharedFlight::outcome() {
+  const auto code = flight_.exit_code();
+  const auto& texts = flight_.wire().texts;
+  if (code && *code < 128 && !texts.empty() && texts.back().text.find("landed") != std::string::npos)
+    return "landed by autopilot";
+  if (code) return *code == 0 ? "flown to its end" : fmt::format("ended, code {}", *code);
+  const FlightCounts counts = flight_.watch().counts();
+  if (counts.incarnation > 0) return "started again";
+  return flight_.commanded(plan_.phase) ? "goes on" : "flies on otherwise";
+}
+
+WireEvidence SharedFlight::evidence() const {
+  auto& flight = const_cast<FlightUnderTest&>(flight_);
+  WireEvidence e;
+  e.commands = flight.watch().commands();
+  e.exposures = flight.watch().exposures();
+  e.not_joined = flight.watch().commands_unseen();
+  e.unseen = flight.watch().exposures_unseen();
+  TimeNs guardian_since_ns = kNever;
+  for (const CompanionBeat& beat : flight.wire().beats) {
+    if (beat.state.guardian && guardian_since_ns == kNever) guardian_since_ns = beat.at_ns - kSecond;
+    if (beat.state.guardian || guardian_since_ns == kNever) continue;
+    e.not_joined.push_back({guardian_since_ns, beat.at_ns});
+    guardian_since_ns = kNever;
+  }
+  if (guardian_since_ns != kNever) e.not_joined.push_back({guardian_since_ns, kForever});
+  for (const Done& d : done_) {
+    const Fault& f = *d.cell.fault;
+    const bool silent =
+        f.promise == Promise::kGuardian || f.promise == Promise::kLineBack || f.promise == Promise::kEnds || f.noisy;
+    if (silent) e.gaps_excused.push_back({d.trial.began_ns, d.trial.watched_until_ns});
+    if (f.promise == Promise::kGuardian || f.injector == Injector::kSignal)
+      e.not_joined.push_back({d.trial.began_ns - 100 * kMillisecond, d.trial.watched_until_ns});
+    if (f.tainted_after_ms > 0)
+      e.tainted.push_back({d.trial.began_ns + from_seconds(f.tainted_after_ms * 1e-3), d.trial.ended_ns});
+  }
+  return e;
+}
+
+std::vector<CellResult> SharedFlight::judge() {
+  WireLimits limits = limits_of(plan_);
+  if (!options_.times) limits.longest_gap_ns = limits.slack_ns = kSecond;
+  const std::vector<Violation> violations = check_wire(flight_.wire(), limits, evidence());
+  const std::vector<tools::Wakeup> reference = flight_.reference();
+  std::vector<CellResult> results;
+  for (const Done& d : done_) results.push_back(judge(d, limits, violations, reference));
+  return results;
+}
+
+CellResult SharedFlight::judge(const Done& d, const WireLimits& limits, const std::vector<Violation>& violations,
+                               const std::vector<tools::Wakeup>& reference) {
+  const Fault& fault = *d.cell.fault;
+  CellResult r{.cell = d.cell, .verdict = Verdict::kOk, .why = {}, .outcome = d.outcome};
+  r.folder = plan_.folder;
+  r.records_lost = flight_.records_lost();
+  r.reaction = react(flight_.wire(), d.trial);
+  std::vector<LogLine> log = flight_.log();
+  if (fault.promise == Promise::kLineBack) {
+    const auto gone = std::ranges::find_if(log, [&](const LogLine& l) {
+      return l.at_ns >= d.trial.began_ns && l.text.find("serial line gone") != std::string::npos;
+    });
+    read_line(flight_.wire(), d.trial, gone == log.end() ? kForever : gone->at_ns, r.reaction);
+  }
+  if (fault.promise == Promise::kGuardian) read_restart(flight_.watch().commands(), d.trial, r.reaction);
+  const bool only = done_.size() == 1;
+  TimeNs next_ns = kForever;
+  for (const Done& other : done_)
+    if (other.trial.began_ns > d.trial.began_ns) next_ns = std::min(next_ns, other.trial.began_ns);
+  const auto belongs = [&](const Violation& v) { return only || (v.at_ns >= d.trial.began_ns && v.at_ns < next_ns); };
+  std::ranges::copy_if(violations, std::back_inserter(r.violations), belongs);
+
+  DurationNs late_ns =
+      fault.noisy ? 0 : reference_late_ns(reference, d.trial.began_ns - kSecond, d.trial.watched_until_ns);
+  for (const Stretch& stall : flight_.tap().stalls())  // our own lateness is nobody's fault
+    if (stall.until_ns > d.trial.began_ns && stall.from_ns < d.trial.watched_until_ns)
+      late_ns += stall.until_ns - stall.from_ns;
+  const auto blame = [&](const std::string& why, double excess) {
+    const bool noise = excess < 0 || (late_ns > 0 && excess <= to_seconds(late_ns) * 1e3 + 1);
+    const Verdict verdict = noise ? Verdict::kHostNoise : Verdict::kMiss;
+    if (r.verdict == Verdict::kMiss) return;
+    r.verdict = verdict;
+    r.why = noise && excess >= 0
+                ? fmt::format("{} (reference or tap late by {:.1f} ms)", why, to_seconds(late_ns) * 1e3)
+                : why;
+  };
+  constexpr double kNotExplained = std::numeric_limits<double>::infinity();
+  if (!d.error.empty()) blame(d.error, kNotExplained);
+  if (const auto breach = breach_of(fault, d.cell.phase, r.reaction, options_.times))
+    blame(breach->why, breach->excess_ms);
+  for (const Violation& v : r.violations)
+    if (const double excess = excess_ms(v, limits); excess <= v.held_ms)
+      blame(fmt::format("{} on the wire ({:.3g}), held by the line", name_of(v.offence), v.value), -1);
+    else
+      blame(fmt::format("{} on the wire ({:.3g})", name_of(v.offence), v.value), excess);
+  const bool may_end = final(fault) || !shares(plan_.phase);
+  if (!may_end && d.outcome != "goes on") blame("the flight did not go on: " + d.outcome, kNotExplained);
+  if (d.counts.incarnation > 0 && fault.promise != Promise::kGuardian)
+    blame("the flight process died and was started again", kNotExplained);
+  if (d.crashed && fault.id != "guardian-killed") blame("crashed: " + d.outcome, kNotExplained);
+  if (!fault.says.empty() && answers_in(fault, d.cell.phase)) {
+    const bool said = std::ranges::any_of(log, [&](const LogLine& l) {
+      return l.at_ns >= d.trial.began_ns - kSecond && l.text.find(fault.says) != std::string::npos;
+    });
+    if (!said) blame(fmt::format("nobody says '{}'", fault.says), kNotExplained);
+  }
+  return r;
+}
+
+}  // namespace wasp::faults

@@ -1,0 +1,47 @@
+// One flight that faults share: each is done, answered and recovered from before the next; what none recovers from ends
+// it. Judged when it is over, from the wire.
+#pragma once
+
+#include <deque>
+#include <functional>
+#include <vector>
+
+#include "faults/campaign.h"
+#include "faults/flight_under_test.h"
+
+namespace wasp::faults {
+
+class SharedFlight {
+ public:
+  SharedFlight(const CampaignOptions& options, const FlightPlan& plan, const std::function<bool()>& interrupted);
+
+  /// Takes cells from the front of `queue` as long as the flight is fit for them, at least one; returns what came of
+  /// them.
+  std::vector<CellResult> fly(std::deque<Cell>& queue);
+
+ private:
+  struct Done {
+    Cell cell;
+    Trial trial = {};
+    std::string error = {};  ///< it could not be done
+    std::string outcome = {};
+    bool crashed = false;
+    FlightCounts counts = {};
+  };
+  bool sleep_until(TimeNs until_ns);
+  Done try_cell(const Cell& cell);
+  void wait_for_answer(const Cell& cell);
+  [[nodiscard]] std::string outcome();
+  std::vector<CellResult> judge();
+  CellResult judge(const Done& done, const WireLimits& limits, const std::vector<Violation>& violations,
+                   const std::vector<tools::Wakeup>& reference);
+  [[nodiscard]] WireEvidence evidence() const;
+
+  const CampaignOptions& options_;
+  FlightPlan plan_;
+  const std::function<bool()>& interrupted_;
+  FlightUnderTest flight_;
+  std::vector<Done> done_;
+};
+
+}  // namespace wasp::faults
