@@ -11,6 +11,7 @@
 #include "faults/campaign.h"
 #include "faults/negative.h"
 #include "faults/result_table.h"
+#include "faults/soak.h"
 #include "rt/clock.h"
 #include "tools/progress_line.h"
 #include "tools/record_bus_guard.h"
@@ -25,6 +26,7 @@ struct Options {
   std::string phase, json;
   bool list = false, negative = false, own_machine = false, no_guardian = false, no_rt = false;
   int class_number = 0;
+  double soak_s = 0;
 };
 
 const std::map<std::string, Phase> kPhaseNames = {{"idle", Phase::kIdle},
@@ -49,6 +51,11 @@ void declare(CLI::App& app, Options& o) {
   app.add_flag("--isolate", o.campaign.isolate, "a flight for each fault, none shared");
   app.add_flag("--negative", o.negative,
                "negative controls: flights weakened on purpose, whose cells must come out as MISS");
+  app.add_option(
+         "--soak", o.soak_s,
+         "instead: one flight of so many seconds, recoverable faults at random; memory, descriptors and latency "
+         "must stay flat")
+      ->check(CLI::Range(120.0, 86400.0));
   app.add_flag("--no-guardian", o.no_guardian, "fly without it");
   app.add_flag("--no-rt", o.no_rt, "fly without real time");
   app.add_flag("--own-machine", o.own_machine, "this machine is nobody else's: its clock may be changed");
@@ -71,6 +78,9 @@ int fly(const Options& o) {
   campaign.times = !campaign.short_set;
   campaign.guarded = !o.no_guardian;
   if (o.no_guardian) abilities.guardian = false;
+  if (o.soak_s > 0)
+    return run_soak({o.soak_s, static_cast<std::uint32_t>(o.campaign.seeds), o.campaign.out}, abilities,
+                    [] { return stop_requested.load(); });
   tools::ProgressLine line("faults");
   const TimeNs began_ns = rt::now();
   CampaignHooks hooks;
