@@ -10,7 +10,7 @@ namespace {
 constexpr std::uint8_t kSystem = 1, kComponent = 1;
 constexpr std::uint64_t kTicksPerSecond = 200;
 constexpr std::size_t kMaxQueued = 64 * 1024;
-constexpr std::uint16_t kCommandSetMode = 176, kCommandArm = 400;
+constexpr std::uint16_t kCommandSetMode = 176, kCommandArm = 400, kCommandInterval = 511;
 constexpr float kForce = 21196.f;
 constexpr std::uint8_t kIgnoreYawRate = 4, kIgnoreThrust = 64, kIgnoreAttitude = 128;
 
@@ -74,6 +74,10 @@ void AutopilotLink::on_command(const mavlink::CommandLong& command, const mavlin
   } else if (command.command == kCommandSetMode) {
     const bool known = command.param1 >= 1 && command.param2 >= 0 && command.param2 < 256;  // NaN fails
     result = known ? flight_.set_mode(static_cast<std::uint32_t>(command.param2)) : CommandResult::kDenied;
+  } else if (command.command == kCommandInterval && command.param1 == float{mavlink::Heartbeat::kId}) {
+    const bool possible = command.param2 >= 5000.f && command.param2 <= 1e6f;  // of 200 ticks a second
+    if (possible) beat_every_ = static_cast<std::uint64_t>(command.param2 / 5000.f);
+    result = possible ? CommandResult::kAccepted : CommandResult::kDenied;
   }
   mavlink::CommandAck ack{};
   ack.command = command.command;
@@ -106,7 +110,7 @@ void AutopilotLink::on_timesync(const mavlink::Timesync& sync, const mavlink::Fr
 void AutopilotLink::step(const ImuSample& imu, TimeNs now_ns) {
   send_imu(imu, now_ns);
   if (ticks_ % 2 == 0) send_attitude(now_ns);
-  if (ticks_ % kTicksPerSecond == 0) send_heartbeat();
+  if (ticks_ % beat_every_ == 0) send_heartbeat();
   if (ticks_ % kTicksPerSecond == kTicksPerSecond / 2) {
     mavlink::Timesync request{};
     request.ts1 = own_time(now_ns);

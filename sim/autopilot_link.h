@@ -1,6 +1,7 @@
-// The autopilot's side of the serial line: MAVLink 2 as system 1, component 1. Sends HEARTBEAT 1 Hz,
+// The autopilot's side of the serial line: MAVLink 2 as system 1, component 1. Sends HEARTBEAT 1 Hz or as asked,
 // ATTITUDE_QUATERNION 100 Hz, HIGHRES_IMU 200 Hz, its own TIMESYNC requests 1 Hz, STATUSTEXT on events; answers
-// TIMESYNC; obeys COMMAND_LONG 400 (arm) and 176 (mode), acknowledges every command; follows SET_ATTITUDE_TARGET. Its
+// TIMESYNC; obeys COMMAND_LONG 400 (arm), 176 (mode), 511 (its own
+// HEARTBEAT's interval), acknowledges every command; follows SET_ATTITUDE_TARGET. Its
 // clock runs at an offset from the simulator's, so that a companion must synchronise.
 #pragma once
 
@@ -49,6 +50,7 @@ class AutopilotLink {
   mavlink::Parser parser_;
   std::vector<std::uint8_t> output_;
   std::uint64_t ticks_ = 0, frames_received_ = 0;
+  std::uint64_t beat_every_ = 200;  ///< ticks
 };
 
 /// Setpoint of a SET_ATTITUDE_TARGET; false when it must be ignored (masked attitude or thrust, numbers not finite, a

@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include <atomic>
+#include <span>
 #include <string>
 #include <thread>
 #include <variant>
@@ -45,6 +46,10 @@ class PtyLine {
     for (ssize_t n; (n = ::read(master_, chunk.data(), chunk.size())) > 0;)
       all.insert(all.end(), chunk.begin(), chunk.begin() + n);
     return all;
+  }
+  /// The autopilot speaks.
+  void write(std::span<const std::uint8_t> bytes) {
+    EXPECT_EQ(::write(master_, bytes.data(), bytes.size()), std::ssize(bytes));
   }
 
  private:
