@@ -140,6 +140,7 @@ void ControlLoop::gather(control::ControlInput& input) WASP_REALTIME {
   for (const CueSource& source : cues_) {
     const std::size_t i = source.behaviour;
     input.cues.present[i] = source.ring.copy_newest(input.cues.cues[i]);
+    input.cues.off[i] = source.watch != nullptr && source.watch->demoted.load(std::memory_order_relaxed) != 0;
     input.cues.overdue[i] = source.watch != nullptr && source.watch->overdue(input.now_ns);
   }
   input.attitude_present = attitude_.copy_newest(input.attitude);
@@ -253,11 +254,10 @@ void ControlLoop::account_cues(const control::ControlInput& input, const Command
   for (const CueSource& source : cues_) {
     const std::size_t i = source.behaviour;
     const Cue& cue = input.cues.cues[i];
-    const bool demoted = source.watch != nullptr && source.watch->demoted.load() != 0;
     const bool late = input.cues.overdue[i] || (input.cues.present[i] && cue.over_budget != 0);
-    const auto state = demoted ? BehaviourState::kDemoted
-                       : late  ? BehaviourState::kOverBudget
-                               : BehaviourState::kPunctual;
+    const auto state = input.cues.off[i] ? BehaviourState::kDemoted
+                       : late            ? BehaviourState::kOverBudget
+                                         : BehaviourState::kPunctual;
     if (i < status.behaviour_state.size())
       status.behaviour_state[i].store(static_cast<std::uint32_t>(state), std::memory_order_relaxed);
     if (!input.cues.present[i]) continue;

@@ -145,6 +145,7 @@ class Flight {
     frame_period_ns_ = from_seconds(1.0 / recording.nominal_rate_hz());
     scripts_ = load_replay_script(options_.replay);
     second_lap_ = ReplayCamera::lap_sequence(recording);
+    allow_for_a_slow_recording();
     const double seconds = options_.seconds > 0 ? options_.seconds : to_seconds(ReplayCamera::lap_ns(recording));
     config_.control.mission.follow_recording = true;
     config_.control.mission.recording_seconds = static_cast<float>(seconds + kReplayTail_s);
@@ -187,6 +188,13 @@ class Flight {
 
   MeasuredCosts measured_costs() const {
     return options_.measured.empty() ? MeasuredCosts{} : read_measured_costs(options_.measured);
+  }
+
+  /// Age limits are made for cameras of 30 Hz; where a recording's frames are further apart, its cues live until the
+  /// frame after next.
+  void allow_for_a_slow_recording() {
+    const DurationNs two_and_a_half = frame_period_ns_ * 5 / 2;
+    for (auto& row : config_.control.arbiter.rows) row.age_limit_ns = std::max(row.age_limit_ns, two_and_a_half);
   }
 
   /// A recording without depth: behaviours that see grey images may supply the height, in their order in the table.
