@@ -22,6 +22,7 @@
 #include "scheduling/link_loop.h"
 #include "scheduling/replay_camera.h"
 #include "scheduling/supervisor.h"
+#include "shm/bus_guard.h"
 #include "shm/topics.h"
 
 namespace wasp::scheduling {
@@ -353,6 +354,7 @@ int flight_main(const BehaviourTable& behaviours, int argc, char** argv) {
   if (const auto code = parse_flight_options(argc, argv, options)) return *code;
   if (options.check_rights) return check_rights(Config{}.control_thread.priority);
   const sigset_t signals = block_signals();
+  shm::install_bus_guard();
   try {
     Config config = load_config(options.configs, names_of(behaviours));
     if (options.replay.empty()) check_streams(behaviours, config);
