@@ -36,8 +36,12 @@ bool follows(const AttitudeSample& from, const AttitudeSample& to) noexcept {
   const float dot = std::fabs(a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]);
   const float turned_rad = 2.f * std::acos(std::min(1.f, dot));
   const auto gap_s = static_cast<float>(to_seconds(std::max<DurationNs>(gap_ns, 0)));
-  return turned_rad <=
-         AttitudeJudge::kJump_rad + AttitudeJudge::kRateTrust * std::max(fastest(from), fastest(to)) * gap_s;
+  float spun_radps = 0;
+  for (std::size_t k = 0; k < 3; ++k)
+    spun_radps = std::max(spun_radps, std::fabs(to.rate_body_radps[k] - from.rate_body_radps[k]));
+  return spun_radps <= AttitudeJudge::kRateJump_radps + AttitudeJudge::kMostSpin_radps2 * gap_s &&
+         turned_rad <=
+             AttitudeJudge::kJump_rad + AttitudeJudge::kRateTrust * std::max(fastest(from), fastest(to)) * gap_s;
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 // What the autopilot's samples must be like to be used: finite, within what a sensor can read, in order of their times,
-// changing, and - an attitude - no further from the last one than its rates can have turned it. Pure: no clock, no
+// changing, and - an attitude - no further from the last one than a vehicle can have turned. Pure: no clock, no
 // ring.
 //
 // An attitude that jumps is refused until kAgree samples in a row agree with each other: a spike is over by then, a
@@ -55,7 +55,9 @@ class ImuJudge {
 /// One stream; one thread. Realtime-safe: yes.
 class AttitudeJudge {
  public:
-  static constexpr int kAgree = 5;                            ///< samples that make a reset out of a jump
+  static constexpr int kAgree = 5;  ///< samples that make a reset out of a jump
+  /// No rotor turns a vehicle faster than this into another rate: a jump that brings its own rates is one all the same.
+  static constexpr float kRateJump_radps = 5.f, kMostSpin_radps2 = 500.f;
   static constexpr float kJump_rad = 0.2f;                    ///< beyond what the rates explain
   static constexpr float kRateTrust = 1.5f;                   ///< rates change between two samples
   static constexpr DurationNs kLongGap = 500 * kMillisecond;  ///< after it nothing is known of what was between

@@ -111,6 +111,7 @@ struct AttitudeJudgeTest : ::testing::Test {
 TEST_F(AttitudeJudgeTest, FastTurnsPassAtFullAndAtATwentiethOfTheRate) {
   for (const DurationNs period_ns : {5 * kMillisecond, 10 * kMillisecond, 100 * kMillisecond})
     for (const float rate : {0.f, 3.f, -6.f}) {
+      judge = AttitudeJudge{};
       rate_radps = rate;
       for (int i = 0; i < 100; ++i) EXPECT_EQ(give(period_ns), SampleFault::kNone) << rate;
     }
@@ -122,6 +123,21 @@ TEST_F(AttitudeJudgeTest, ASpikeIsRefusedAndTheNextGoodSamplePasses) {
     yaw_rad += 1.f;
     EXPECT_EQ(give(), SampleFault::kJump);
     yaw_rad -= 1.f;
+    EXPECT_EQ(give(), SampleFault::kNone);
+  }
+}
+
+TEST_F(AttitudeJudgeTest, ASpikeThatBringsTheRatesToExplainItIsOneAllTheSame) {
+  ASSERT_EQ(give(), SampleFault::kNone);
+  for (const float angle_rad : {0.25f, 0.3f}) {
+    yaw_rad += angle_rad;
+    rate_radps = angle_rad / 0.01f;  // there within one sample
+    AttitudeSample s = next(0);
+    now_ns += 10 * kMillisecond;
+    s.exposed_at_ns = now_ns;
+    EXPECT_EQ(judge.judge(s, now_ns), SampleFault::kJump);
+    yaw_rad -= angle_rad;
+    rate_radps = 0;
     EXPECT_EQ(give(), SampleFault::kNone);
   }
 }
