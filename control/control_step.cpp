@@ -265,7 +265,7 @@ ControlOutput control_step(const ControlParams& p, const ControlInput& in, Contr
   const MissionWish wish =
       mission_step(p.mission,
                    {in.now_ns, in.autopilot.armed, in.autopilot.follows, height_seen, s.height.height_m,
-                    s.height.climb_rate_mps, in.stop_requested, in.autopilot.heard_at_ns != kNever},
+                    s.height.climb_rate_mps, in.stop_requested, in.autopilot.heard_at_ns != kNever, in.may_arm},
                    s.mission);
   const Setpoint wanted = wanted_setpoint(p, in, intention, wish, s);
   s.sent_before = s.sent;

@@ -57,6 +57,7 @@ struct ControlInput {
   AutopilotState autopilot;
   bool stop_requested = false;
   bool deadlines_missed = false;  ///< the last two ticks
+  bool may_arm = true;            ///< false: on the ground, arming waits
 };
 
 struct ControlState {
