@@ -6,7 +6,7 @@
 namespace wasp::control {
 namespace {
 
-constexpr DurationNs kClockSlack = 50 * kMillisecond;  // a cue from further ahead carries a wrong clock, and never ages
+constexpr DurationNs kClockSlack = 1 * kMillisecond;  // a cue from further ahead carries a wrong clock, and ages late
 
 constexpr int kOverdueRank = 100;  // more than any configured rank
 
@@ -30,10 +30,15 @@ bool recent(const Cue& cue, const ArbiterRow& row, TimeNs now_ns) noexcept {
   return cue.exposed_at_ns <= now_ns + kClockSlack && cue.exposed_at_ns >= now_ns - row.age_limit_ns;
 }
 
-bool all_finite(const CueBody& b) noexcept {
-  const float sum = b.height_m + b.height_sigma_m + b.heading_rate_radps + b.pitch_rad + b.velocity_forward_mps +
-                    b.velocity_right_mps + b.velocity_sigma_mps + b.climb_mps + b.climb_1ps;
-  return std::isfinite(sum);
+/// Finite, and no more than a small vehicle near the ground can mean.
+bool credible(const CueBody& b) noexcept {
+  constexpr float kMost_m = 1000.f, kMost_mps = 100.f, kMost_1ps = 100.f, kMost_rad = 10.f;
+  const auto within = [](float most, auto... values) noexcept {
+    return ((std::fabs(values) <= most) && ...);  // NaN fails
+  };
+  return within(kMost_m, b.height_m, b.height_sigma_m) && within(kMost_rad, b.pitch_rad) &&
+         within(kMost_1ps, b.heading_rate_radps, b.climb_1ps) &&
+         within(kMost_mps, b.velocity_forward_mps, b.velocity_right_mps, b.velocity_sigma_mps, b.climb_mps);
 }
 
 void add_wishes(const Cue& cue, const ArbiterRow& row, Intention& out) noexcept {
@@ -49,7 +54,7 @@ void add_wishes(const Cue& cue, const ArbiterRow& row, Intention& out) noexcept 
 }  // namespace
 
 bool usable(const Cue& cue, const ArbiterRow& row, TimeNs now_ns) noexcept {
-  return all_finite(cue.body) && cue.body.validity == Validity::kValid && cue.over_budget == 0 &&
+  return credible(cue.body) && cue.body.validity == Validity::kValid && cue.over_budget == 0 &&
          recent(cue, row, now_ns);
 }
 
@@ -61,8 +66,9 @@ Intention arbitrate(const ArbiterParams& params, const CueSet& set, TimeNs now_n
     const ArbiterRow& row = params.rows[k];
     const Cue& cue = set.cues[k];
     if (!set.present[k] || !recent(cue, row, now_ns)) continue;
+    out.images = true;
     if (cue.body.avoid != 0) out.avoid = true, note_evidence(out, cue, row);
-    if (!usable(cue, row, now_ns)) continue;
+    if (set.off[k] || !usable(cue, row, now_ns)) continue;
     if (cue.body.has_height != 0) height.offer(i, row.height_rank, set.overdue[k]);
     if (cue.body.has_velocity != 0) velocity.offer(i, row.velocity_rank, set.overdue[k]);
     if (cue.body.has_climb != 0) climb.offer(i, row.climb_rank, set.overdue[k]);

@@ -1,4 +1,5 @@
-// The arbiter turns the newest cue of every behaviour into one intention. A cue older than its age limit is absent.
+// The arbiter turns the newest cue of every behaviour into one intention. A cue older than its age limit is absent, and
+// so is one with a number that no vehicle of this kind can mean, or of a behaviour that was switched off in flight.
 // Avoid wins over every wish to go forward, and needs no usable cue: one that is blind, late or broken in another field
 // still brakes. Heading and pitch are weighted sums; height, velocity and the wish to climb each come from the first
 // source in their fallback order that can see; one that is at this moment over its time budget is asked last. Above all
@@ -16,7 +17,7 @@ inline constexpr int kMaxBehaviours = 24;
 
 /// How the arbiter treats one behaviour; row i belongs to Cue::behaviour == i.
 struct ArbiterRow {
-  DurationNs age_limit_ns = 250 * kMillisecond;
+  DurationNs age_limit_ns = 95 * kMillisecond;
   int height_rank = -1;        ///< 0 is asked first; -1: never a height source
   int velocity_rank = -1;      ///< likewise for the velocity over ground
   int climb_rank = -1;         ///< likewise for the wish to climb
@@ -34,6 +35,7 @@ struct CueSet {
   std::array<Cue, kMaxBehaviours> cues{};
   std::array<bool, kMaxBehaviours> present{};
   std::array<bool, kMaxBehaviours> overdue{};  ///< its step is running longer than its budget at this moment
+  std::array<bool, kMaxBehaviours> off{};      ///< taken out of real time for this flight: only an avoid is heard
 };
 
 struct Intention {
@@ -46,6 +48,7 @@ struct Intention {
   TimeNs velocity_exposed_at_ns = kNever;
   int climb_source = -1;
   float climb_mps = 0, climb_1ps = 0;
+  bool images = false;   ///< a cue is recent, be it blind: frames come
   bool avoid = false;    ///< something is ahead: not forward; says nothing of heading, height or sideways
   bool steered = false;  ///< a behaviour with a weight says something of the heading
   float heading_rate_radps = 0;
@@ -54,7 +57,7 @@ struct Intention {
   TimeNs usable_until_ns = kForever;     ///< when the first of its evidence reaches its age limit
 };
 
-/// True if the cue may be used at `now_ns`: valid, finite, made within its budget and within its age limit.
+/// True if the cue may be used at `now_ns`: valid, credible in every number, made within its budget and its age limit.
 /// Realtime-safe: yes.
 bool usable(const Cue& cue, const ArbiterRow& row, TimeNs now_ns) WASP_REALTIME;
 

@@ -34,7 +34,7 @@ float cos_tilt(const ControlInput& in) noexcept {
   return has_attitude(in) ? (attitude_of(in) * Vec3::UnitZ()).z() : 1.f;
 }
 
-Situation assess(const ControlParams& p, const ControlInput& in, bool height_seen, const ControlState& s,
+Situation assess(const ControlParams& p, const ControlInput& in, bool height_seen, bool images, const ControlState& s,
                  bool finite) noexcept {
   Situation now;
   now.autopilot_armed = in.autopilot.armed;
@@ -42,6 +42,7 @@ Situation assess(const ControlParams& p, const ControlInput& in, bool height_see
   now.link_alive = in.autopilot.heard_at_ns != kNever && in.now_ns - in.autopilot.heard_at_ns <= p.link_age_limit_ns;
   now.attitude_fresh = has_attitude(in) && in.now_ns - in.attitude.exposed_at_ns <= p.attitude_age_limit_ns;
   now.ground_seen = height_seen;
+  now.images_fresh = images;
   now.ground_lost_long =
       !now.ground_seen && s.ground_seen_at_ns != kNever && in.now_ns - s.ground_seen_at_ns > p.ground_hold_limit_ns;
   now.setpoint_finite = finite;
@@ -264,13 +265,13 @@ ControlOutput control_step(const ControlParams& p, const ControlInput& in, Contr
   const MissionWish wish =
       mission_step(p.mission,
                    {in.now_ns, in.autopilot.armed, in.autopilot.follows, height_seen, s.height.height_m,
-                    s.height.climb_rate_mps, in.stop_requested, in.autopilot.heard_at_ns != kNever},
+                    s.height.climb_rate_mps, in.stop_requested, in.autopilot.heard_at_ns != kNever, in.may_arm},
                    s.mission);
   const Setpoint wanted = wanted_setpoint(p, in, intention, wish, s);
   s.sent_before = s.sent;
   Setpoint probe = s.sent;
   const bool finite = limit(p.limits, wanted, in.dt_s, probe);
-  flight_mode_step(assess(p, in, height_seen, s, finite), s.mode);
+  flight_mode_step(assess(p, in, height_seen, intention.images, s, finite), s.mode);
 
   const bool standing = !wish.rotors && s.mode.mode != FlightMode::kManual;
   const Setpoint chosen = standing ? Setpoint{} : by_mode(p, in, s.mode.mode, wanted);

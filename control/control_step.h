@@ -27,7 +27,7 @@ struct ControlParams {
   LimitParams limits;
   MissionParams mission;
   DurationNs attitude_age_limit_ns = 200 * kMillisecond;
-  DurationNs link_age_limit_ns = 300 * kMillisecond;  ///< silence after which the link counts as lost
+  DurationNs link_age_limit_ns = 240 * kMillisecond;  ///< silence after which the link counts as lost
   DurationNs ground_hold_limit_ns = 1 * kSecond;      ///< how long to hold on the accelerometer alone
   float avoid_hold_s = 3.f;                           ///< forward speed stays zero this long after avoid was raised
   float avoid_brake_rad =
@@ -57,6 +57,7 @@ struct ControlInput {
   AutopilotState autopilot;
   bool stop_requested = false;
   bool deadlines_missed = false;  ///< the last two ticks
+  bool may_arm = true;            ///< false: on the ground, arming waits
 };
 
 struct ControlState {

@@ -26,6 +26,7 @@ constexpr std::array kRows = {
         ModeReason::kCueLost},
     Row{[](const Situation& s) WASP_REALTIME { return s.deadlines_missed; }, FlightMode::kHold,
         ModeReason::kDeadlineMissed},
+    Row{[](const Situation& s) WASP_REALTIME { return !s.images_fresh; }, FlightMode::kHold, ModeReason::kCueLost},
     Row{[](const Situation& s) WASP_REALTIME { return !s.ground_seen; }, FlightMode::kHold, ModeReason::kCueLost},
     Row{[](const Situation&) WASP_REALTIME { return true; }, FlightMode::kBehaviour, ModeReason::kMissionStep},
 };
@@ -52,8 +53,8 @@ const char* name_of(ModeReason reason) noexcept {
   constexpr std::array kNames = {"none",
                                  "start",
                                  "mission step",
-                                 "ground lost",
-                                 "ground seen again",
+                                 "nothing usable seen",
+                                 "seen again",
                                  "attitude lost",
                                  "attitude back",
                                  "link lost",

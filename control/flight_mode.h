@@ -14,6 +14,7 @@ struct Situation {
   bool link_alive = false;         ///< heard from within the link age limit
   bool attitude_fresh = false;
   bool ground_seen = false;       ///< a height source is usable
+  bool images_fresh = false;      ///< frames come, be they of use or not
   bool ground_lost_long = false;  ///< none was for longer than the hold limit
   bool setpoint_finite = true;
   bool deadlines_missed = false;  ///< two consecutive ticks

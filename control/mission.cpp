@@ -35,7 +35,7 @@ bool standing_long_enough(const MissionParams& p, const MissionInput& in, Missio
 
 MissionWish wait_and_arm(const MissionParams& p, const MissionInput& in, MissionState& s, double in_phase_s) noexcept {
   MissionWish wish;
-  const bool ready = in.heard && (in.ground_seen || p.follow_recording);
+  const bool ready = in.heard && in.may_arm && (in.ground_seen || p.follow_recording);
   if (s.phase == MissionPhase::kWait && in.heard && in.armed) {
     end_early(s, MissionPhase::kBroken, EarlyEnd::kFoundArmed, in.now_ns);  // perhaps in the air: not ours
   } else if (in.stop_requested) {
@@ -46,7 +46,7 @@ MissionWish wait_and_arm(const MissionParams& p, const MissionInput& in, Mission
     s.ground_height_m = in.height_m;
     enter(s, MissionPhase::kArm, in.now_ns);
   } else if (s.phase == MissionPhase::kArm) {
-    wish.armed = true;
+    wish.armed = in.may_arm;
     if (!in.armed) s.ground_height_m = in.height_m;
     if (in.armed && in.follows) enter(s, leg_phase(0), in.now_ns);
   }

@@ -47,7 +47,8 @@ struct MissionInput {
   bool armed = false, follows = false, ground_seen = false;
   float height_m = 0, climb_rate_mps = 0;
   bool stop_requested = false;
-  bool heard = true;  ///< the autopilot has said whether it is armed
+  bool heard = true;    ///< the autopilot has said whether it is armed
+  bool may_arm = true;  ///< false: something of ours is not as it must be for a flight
 };
 
 /// Why a mission ended before its end.

@@ -5,7 +5,8 @@
 namespace wasp::rt {
 
 /// Restricts the calling thread, for good, to: futex, clock_nanosleep, clock_gettime, read, write, ppoll/poll,
-/// ioctl, getrusage, openat/close/dup3 (reopening a lost serial line), and what a thread needs to end. False if the
+/// ioctl, getrusage, openat/close/dup3 (reopening a lost serial line), what a
+/// thread needs to end, and the mmap of one anonymous page in the place of another (shm/bus_guard.h). False if the
 /// kernel refused.
 bool restrict_thread_syscalls();
 

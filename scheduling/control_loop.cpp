@@ -12,6 +12,7 @@ namespace {
 constexpr DurationNs kHeartbeatPeriod = 1 * kSecond;
 constexpr DurationNs kRequestPeriod = 500 * kMillisecond;
 constexpr int kMissesBeforeHold = 2;
+constexpr DurationNs kPunctualFor = 1 * kSecond;  // before arming is thought of again
 constexpr float kOffTheGround_m = 0.2f;
 
 }  // namespace
@@ -53,6 +54,8 @@ void ControlLoop::tick(const rt::Release& release, LoopControl& control) WASP_RE
   input.dt_s = static_cast<float>(to_seconds(config_.control_period_ns * static_cast<DurationNs>(1 + release.skipped)));
   input.stop_requested = control.stop_requested.load(std::memory_order_relaxed);
   input.deadlines_missed = consecutive_misses_ >= kMissesBeforeHold;
+  const char* const bar = bar_to_arming(input.now_ns);
+  input.may_arm = bar == nullptr;
   gather(input);
   control::ControlOutput output = control::control_step(config_.control, input, state_);
   Command& command = output.command;
@@ -63,7 +66,7 @@ void ControlLoop::tick(const rt::Release& release, LoopControl& control) WASP_RE
   send(input, output, control);
   account(input, command, release.skipped, control);
   commands_.write(command, rt::now());
-  announce(command);
+  announce(command, bar);
   mark(input, command, control);
   end_of_tick(input, control);
   beat(input, output);
@@ -140,6 +143,7 @@ void ControlLoop::gather(control::ControlInput& input) WASP_REALTIME {
   for (const CueSource& source : cues_) {
     const std::size_t i = source.behaviour;
     input.cues.present[i] = source.ring.copy_newest(input.cues.cues[i]);
+    input.cues.off[i] = source.watch != nullptr && source.watch->demoted.load(std::memory_order_relaxed) != 0;
     input.cues.overdue[i] = source.watch != nullptr && source.watch->overdue(input.now_ns);
   }
   input.attitude_present = attitude_.copy_newest(input.attitude);
@@ -253,11 +257,10 @@ void ControlLoop::account_cues(const control::ControlInput& input, const Command
   for (const CueSource& source : cues_) {
     const std::size_t i = source.behaviour;
     const Cue& cue = input.cues.cues[i];
-    const bool demoted = source.watch != nullptr && source.watch->demoted.load() != 0;
     const bool late = input.cues.overdue[i] || (input.cues.present[i] && cue.over_budget != 0);
-    const auto state = demoted ? BehaviourState::kDemoted
-                       : late  ? BehaviourState::kOverBudget
-                               : BehaviourState::kPunctual;
+    const auto state = input.cues.off[i] ? BehaviourState::kDemoted
+                       : late            ? BehaviourState::kOverBudget
+                                         : BehaviourState::kPunctual;
     if (i < status.behaviour_state.size())
       status.behaviour_state[i].store(static_cast<std::uint32_t>(state), std::memory_order_relaxed);
     if (!input.cues.present[i]) continue;
@@ -297,18 +300,35 @@ void ControlLoop::report_miss(const Command& command, std::uint64_t skipped, boo
   watch.report(miss);
 }
 
-void ControlLoop::announce(const Command& command) WASP_REALTIME {
-  if (command.mode != announced_mode_)
-    wiring_.events->say(command.released_at_ns, "flight mode: ", control::name_of(command.mode));
-  if (command.mode != announced_mode_ && command.mode == FlightMode::kFailsafe)
-    wiring_.events->say(command.released_at_ns, "failsafe because: ", control::name_of(command.reason));
-  if (command.mission_phase != announced_phase_)
-    wiring_.events->say(command.released_at_ns,
-                        "mission: ", control::name_of(static_cast<control::MissionPhase>(command.mission_phase)));
+const char* ControlLoop::bar_to_arming(TimeNs now_ns) WASP_REALTIME {
+  if (consecutive_misses_ >= kMissesBeforeHold) punctual_from_ns_ = now_ns + kPunctualFor;
+  if (now_ns < punctual_from_ns_) return "control missed its deadlines";
+  if (wiring_.watch->stolen.load(std::memory_order_relaxed) != 0)
+    return "control does not run as the thread table says";
+  return nullptr;
+}
+
+void ControlLoop::announce(const Command& command, const char* bar) WASP_REALTIME {
+  const auto say = [&](const char* head, const char* tail) noexcept {
+    wiring_.events->say(command.released_at_ns, head, tail);
+  };
+  const bool other_mode = command.mode != announced_mode_, other_reason = command.reason != announced_reason_;
+  if (other_mode) say("flight mode: ", control::name_of(command.mode));
+  if (other_mode || other_reason) {
+    if (command.mode == FlightMode::kHold) say("hold because: ", control::name_of(command.reason));
+    if (command.mode == FlightMode::kManual) say("manual because: ", control::name_of(command.reason));
+    if (command.mode == FlightMode::kFailsafe) say("failsafe because: ", control::name_of(command.reason));
+  }
+  const auto phase = static_cast<control::MissionPhase>(command.mission_phase);
+  if (command.mission_phase != announced_phase_) say("mission: ", control::name_of(phase));
   if (state_.mission.early_end != announced_end_)
-    wiring_.events->say(command.released_at_ns, "mission ends early: ", control::name_of(state_.mission.early_end));
+    say("mission ends early: ", control::name_of(state_.mission.early_end));
+  const bool waiting = phase == control::MissionPhase::kWait || phase == control::MissionPhase::kArm;
+  if (waiting && bar != nullptr && bar != announced_bar_) say("not arming: ", bar);
+  announced_bar_ = bar;
   announced_end_ = state_.mission.early_end;
   announced_mode_ = command.mode;
+  announced_reason_ = command.reason;
   announced_phase_ = command.mission_phase;
 }
 

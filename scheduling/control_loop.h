@@ -82,7 +82,9 @@ class ControlLoop {
   void beat(const control::ControlInput& input, const control::ControlOutput& output) WASP_REALTIME;
   void last_beat() noexcept;
   void mark(const control::ControlInput& input, const Command& command, LoopControl& control) WASP_REALTIME;
-  void announce(const Command& command) WASP_REALTIME;
+  /// Why the vehicle must not be armed now; null: it may.
+  [[nodiscard]] const char* bar_to_arming(TimeNs now_ns) WASP_REALTIME;
+  void announce(const Command& command, const char* bar) WASP_REALTIME;
 
   Config config_;
   ControlWiring wiring_;
@@ -97,7 +99,10 @@ class ControlLoop {
   TimeNs heartbeat_due_ns_ = 0, request_due_ns_ = 0;
   drivers::CompanionState told_;  ///< in the last heartbeat
   int consecutive_misses_ = 0;
+  TimeNs punctual_from_ns_ = 0;  ///< two misses in a row bar arming until then
   FlightMode announced_mode_ = FlightMode::kDisarmed;
+  ModeReason announced_reason_ = ModeReason::kNone;
+  const char* announced_bar_ = nullptr;
   std::uint8_t announced_phase_ = 255;
   control::EarlyEnd announced_end_ = control::EarlyEnd::kNone;
   std::atomic<bool> mission_over_{false};

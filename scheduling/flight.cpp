@@ -23,6 +23,7 @@
 #include "scheduling/link_loop.h"
 #include "scheduling/replay_camera.h"
 #include "scheduling/supervisor.h"
+#include "shm/bus_guard.h"
 #include "shm/topics.h"
 
 namespace wasp::scheduling {
@@ -147,6 +148,7 @@ class Flight {
     frame_period_ns_ = from_seconds(1.0 / recording.nominal_rate_hz());
     scripts_ = load_replay_script(options_.replay);
     second_lap_ = ReplayCamera::lap_sequence(recording);
+    allow_for_a_slow_recording();
     const double seconds = options_.seconds > 0 ? options_.seconds : to_seconds(ReplayCamera::lap_ns(recording));
     config_.control.mission.follow_recording = true;
     config_.control.mission.recording_seconds = static_cast<float>(seconds + kReplayTail_s);
@@ -199,6 +201,13 @@ class Flight {
 
   MeasuredCosts measured_costs() const {
     return options_.measured.empty() ? MeasuredCosts{} : read_measured_costs(options_.measured);
+  }
+
+  /// Age limits are made for cameras of 30 Hz; where a recording's frames are further apart, its cues live until the
+  /// frame after next.
+  void allow_for_a_slow_recording() {
+    const DurationNs two_and_a_half = frame_period_ns_ * 5 / 2;
+    for (auto& row : config_.control.arbiter.rows) row.age_limit_ns = std::max(row.age_limit_ns, two_and_a_half);
   }
 
   /// A recording without depth: behaviours that see grey images may supply the height, in their order in the table.
@@ -361,6 +370,7 @@ int flight_main(const BehaviourTable& behaviours, int argc, char** argv) {
   if (const auto code = parse_flight_options(argc, argv, options)) return *code;
   if (options.check_rights) return check_rights(Config{}.control_thread.priority);
   const sigset_t signals = block_signals();
+  shm::install_bus_guard();
   try {
     Config config = load_config(options.configs, names_of(behaviours));
     if (options.replay.empty()) check_streams(behaviours, config);

@@ -1,5 +1,7 @@
 #include "scheduling/link_loop.h"
 
+#include <algorithm>
+
 #include "rt/clock.h"
 #include "shm/topics.h"
 
@@ -10,6 +12,10 @@ constexpr DurationNs kTimesyncPeriod = 200 * kMillisecond;
 constexpr DurationNs kReopenPeriod = 50 * kMillisecond;
 constexpr int kRoomForReply_bytes = 1024;  // pending output below which an answer may go out
 constexpr int kReadsPerWake = 8;
+constexpr DurationNs kQuiet = 1 * kSecond;            // after it a refusal is news again
+constexpr DurationNs kStranger = 300 * kMillisecond;  // others speak, the autopilot does not: say so
+constexpr DurationNs kStrangerPeriod = 10 * kSecond;
+constexpr DurationNs kAutopilotBeat = 200 * kMillisecond;
 }  // namespace
 
 LinkLoop::LinkLoop(const shm::Region& flight, drivers::SerialPort& port, drivers::AutopilotLink& autopilot,
@@ -27,6 +33,7 @@ LinkLoop::LinkLoop(const shm::Region& flight, drivers::SerialPort& port, drivers
 void LinkLoop::run(LoopControl& control) {
   RealtimeLoop loop(control, watch_);
   faults_.use(control.faults);
+  opened_at_ns_ = rt::now();
   while (loop.tick()) {
     if (gone_)
       reopen(control);
@@ -63,6 +70,50 @@ void LinkLoop::take(LoopControl& control) WASP_REALTIME {
     }
   }
   control.status->bad_frames.store(autopilot_.wire_counts().bad_crc, std::memory_order_relaxed);
+  watch_the_other_side(*control.status);
+  ask_for_beats();
+}
+
+/// What the driver counts and somebody must hear of: samples without numbers, a clock that began anew, strangers in the
+/// autopilot's place.
+void LinkLoop::watch_the_other_side(RunStatus& status) WASP_REALTIME {
+  const drivers::LinkCounts& now = autopilot_.counts();
+  status.samples_refused.store(implausible_ + now.refused_samples, std::memory_order_relaxed);
+  if (now.refused_samples != seen_.refused_samples) tell(drivers::SampleFault::kNotFinite, "sample refused: ", driver_);
+  if (now.clock_restarts != seen_.clock_restarts) {
+    events_.say(received_at_ns_, "the autopilot's clock began anew: it was started again, or its time was set");
+    beats_asked_ = false;
+  }
+  const bool silent = !heard_ && received_at_ns_ - std::max(now_.heard_at_ns, opened_at_ns_) > kStranger;
+  if (now.foreign_systems != seen_.foreign_systems && silent && received_at_ns_ >= stranger_due_ns_) {
+    events_.say(received_at_ns_, "the autopilot is silent, but another system speaks: [autopilot] system_id?");
+    stranger_due_ns_ = received_at_ns_ + kStrangerPeriod;
+  }
+  seen_ = now;
+}
+
+/// Says what is wrong with a stream's samples, once a burst.
+void LinkLoop::tell(drivers::SampleFault fault, std::string_view head, Told& told) WASP_REALTIME {
+  const bool news = fault != told.fault || received_at_ns_ >= told.until_ns;
+  told = {fault, received_at_ns_ + kQuiet};
+  if (news) events_.say(received_at_ns_, head, drivers::name_of(fault));
+}
+
+/// Counts and tells of a sample that must not be used.
+bool LinkLoop::usable(drivers::SampleFault fault, std::string_view head, Told& told) WASP_REALTIME {
+  if (fault == drivers::SampleFault::kNone) return true;
+  ++implausible_;
+  tell(fault, head, told);
+  return false;
+}
+
+/// Its mode and arming are to be known within half a second; by itself it says them once a second.
+void LinkLoop::ask_for_beats() WASP_REALTIME {
+  if (beats_asked_ || !heartbeat_seen_) return;
+  beats_asked_ = true;
+  std::array<std::uint8_t, mavlink::kMaxFrame> out;
+  const std::size_t n = autopilot_.encode_message_interval(mavlink::Heartbeat::kId, kAutopilotBeat, 0, out);
+  reply(std::span<const std::uint8_t>(out.data(), n));
 }
 
 void LinkLoop::ask_for_time(TimeNs now_ns) WASP_REALTIME {
@@ -76,7 +127,8 @@ void LinkLoop::reopen(LoopControl& control) {
   const rt::NonRealtimeSection opening;  // nothing waits for a line that is gone
   rt::sleep_until(rt::now() + kReopenPeriod);
   if (!port_.try_reopen()) return;
-  gone_ = false;
+  gone_ = beats_asked_ = false;
+  opened_at_ns_ = rt::now();
   autopilot_.restart();
   control.status->link_reconnects.fetch_add(1, std::memory_order_relaxed);
   events_.say(rt::now(), "serial line reopened");
@@ -86,6 +138,7 @@ void LinkLoop::on_imu(const ImuSample& received) WASP_REALTIME {
   heard_ = true;
   ImuSample sample = received;
   if (!faults_.pass(sample, received_at_ns_)) return;
+  if (!usable(imu_judge_.judge(sample, received_at_ns_), "imu refused: ", imu_told_)) return;
   imu_.write(sample, received_at_ns_);
   age_->record(received_at_ns_ - sample.exposed_at_ns);
 }
@@ -94,6 +147,7 @@ void LinkLoop::on_attitude(const AttitudeSample& received) WASP_REALTIME {
   heard_ = true;
   AttitudeSample sample = received;
   if (!faults_.pass(sample, received_at_ns_)) return;
+  if (!usable(attitude_judge_.judge(sample, received_at_ns_), "attitude refused: ", attitude_told_)) return;
   attitude_.write(sample, received_at_ns_);
 }
 
@@ -104,8 +158,14 @@ void LinkLoop::on_heartbeat(const drivers::AutopilotStatus& status) WASP_REALTIM
 }
 
 void LinkLoop::on_ack(std::uint16_t command, std::uint8_t result) WASP_REALTIME {
-  if (result == 1) events_.say(received_at_ns_, "autopilot not yet ready for command ", static_cast<long>(command));
-  if (result > 1) events_.say(received_at_ns_, "autopilot refused command ", static_cast<long>(command));
+  using namespace mavlink;  // NOLINT: its enumerations
+  if (result == mav_result::kAccepted || result == mav_result::kInProgress) return;
+  const std::string_view what =
+      command == mav_cmd::kComponentArmDisarm   ? "autopilot refuses to arm or disarm, MAV_RESULT "
+      : command == mav_cmd::kDoSetMode          ? "autopilot refuses our mode, MAV_RESULT "
+      : command == mav_cmd::kSetMessageInterval ? "autopilot keeps its own rate of heartbeats, MAV_RESULT "
+                                                : "autopilot refuses a command, MAV_RESULT ";
+  events_.say(received_at_ns_, what, static_cast<long>(result));
 }
 
 void LinkLoop::on_statustext(std::uint8_t, std::string_view text) WASP_REALTIME {

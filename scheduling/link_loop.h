@@ -1,9 +1,10 @@
-// The link thread: bytes from the serial line become IMU and attitude samples in the rings and a report on the
-// autopilot. It asks for the autopilot's time and answers when asked (only while the line has room, so that an answer
-// never splits a setpoint) and reopens a lost line by itself.
+// The link thread: bytes from the serial line become IMU and attitude samples in the rings, if they are plausible
+// (drivers/sample_judge.h), and a report on the autopilot. It asks for the autopilot's time and answers when asked
+// (only while the line has room, so that an answer never splits a setpoint) and reopens a lost line by itself.
 #pragma once
 
 #include "drivers/autopilot_link.h"
+#include "drivers/sample_judge.h"
 #include "drivers/serial_port.h"
 #include "rt/seqlock.h"
 #include "scheduling/control_loop.h"
@@ -34,6 +35,15 @@ class LinkLoop {
   void take(LoopControl& control) WASP_REALTIME;
   void ask_for_time(TimeNs now_ns) WASP_REALTIME;
   void reopen(LoopControl& control);
+  /// What was last said of a stream, and until when it is not said again.
+  struct Told {
+    drivers::SampleFault fault = drivers::SampleFault::kNone;
+    TimeNs until_ns = 0;
+  };
+  bool usable(drivers::SampleFault fault, std::string_view head, Told& told) WASP_REALTIME;
+  void tell(drivers::SampleFault fault, std::string_view head, Told& told) WASP_REALTIME;
+  void watch_the_other_side(RunStatus& status) WASP_REALTIME;
+  void ask_for_beats() WASP_REALTIME;
 
   drivers::SerialPort& port_;
   drivers::AutopilotLink& autopilot_;
@@ -48,6 +58,13 @@ class LinkLoop {
   bool gone_ = false;
   bool heard_ = false;  ///< the autopilot itself spoke in the bytes at hand
   bool heartbeat_seen_ = false;
+  drivers::ImuJudge imu_judge_;
+  drivers::AttitudeJudge attitude_judge_;
+  Told imu_told_, attitude_told_, driver_;
+  std::uint64_t implausible_ = 0;  ///< samples refused here
+  drivers::LinkCounts seen_;       ///< of the driver, at the last look
+  TimeNs opened_at_ns_ = 0, stranger_due_ns_ = 0;
+  bool beats_asked_ = false;
   std::array<std::uint8_t, 4096> buffer_{};
 };
 

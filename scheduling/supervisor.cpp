@@ -8,6 +8,7 @@
 #include <cstring>
 
 #include "rt/clock.h"
+#include "shm/bus_guard.h"
 
 namespace wasp::scheduling {
 namespace {
@@ -42,10 +43,12 @@ Supervisor::Supervisor(WatchBoard& board, RunStatus& status, SupervisorOptions o
                {{&status.frames_duplicate, "duplicate"},
                 {&status.frames_disordered, "out of order"},
                 {&status.frames_malformed, "malformed"},
-                {&status.frames_misdated, "misdated"}}}} {
+                {&status.frames_misdated, "misdated"}}}},
+      lost_pages_(shm::lost_pages()) {
   for (auto& watch : board.threads) {
     if (watch.name == kControl) core_ = watch.core;
     subjects_.push_back({&watch});
+    subjects_.back().schedule.emplace(watch, options_.real_time);
   }
   // Control first: its misses have the first claim on the files.
   std::stable_partition(subjects_.begin(), subjects_.end(), [](const Subject& s) { return s.watch->name == kControl; });
@@ -66,6 +69,8 @@ void Supervisor::look() {
   if (missed) report();
   board_.frozen.store(0, std::memory_order_relaxed);  // a miss since then is taken at the next look, unfrozen
   for (auto& s : subjects_) demote_if_runaway(s);
+  for (auto& s : subjects_) s.schedule->look(status_, log_);
+  look_for_lost_pages();
   for (auto& b : bursts_) b.look(looked_at_ns_, log_);
 }
 
@@ -150,6 +155,16 @@ Incident Supervisor::gather(const Subject& subject) const {
     i.threads.push_back({w.name, w.core, w.priority, w.tid.load(), w.demoted.load() != 0, s.within, w.trace.copy()});
   }
   return i;
+}
+
+/// Zeros stand where a file was cut short; what was read from there is old by now, and will be refused as such.
+void Supervisor::look_for_lost_pages() {
+  const std::uint64_t now = shm::lost_pages();
+  if (now == lost_pages_) return;
+  status_.pages_lost.fetch_add(now - lost_pages_, std::memory_order_relaxed);
+  log_(fmt::format("shared memory lost: {} pages of {}, whose file was cut short", now - lost_pages_,
+                   shm::lost_names(lost_pages_)));
+  lost_pages_ = now;
 }
 
 void Supervisor::hush() {

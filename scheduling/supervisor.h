@@ -1,6 +1,6 @@
-// The ordinary thread's eye on the real-time threads: writes an incident for a miss, and takes a behaviour that does
-// not keep to its budget out of SCHED_FIFO before it can starve the others. It never waits for a real-time thread, and
-// none waits for it.
+// The ordinary thread's eye on the real-time threads: writes an incident for a miss, takes a behaviour that does not
+// keep to its budget out of SCHED_FIFO before it can starve the others, sees whose schedule was changed from outside,
+// and tells the log what was refused or lost. It never waits for a real-time thread, and none waits for it.
 #pragma once
 
 #include <functional>
@@ -10,6 +10,7 @@
 
 #include "scheduling/burst_report.h"
 #include "scheduling/incident_folder.h"
+#include "scheduling/schedule_watch.h"
 #include "scheduling/stage_table.h"
 #include "scheduling/switch_trace.h"
 #include "scheduling/thread_watch.h"
@@ -52,6 +53,7 @@ class Supervisor {
     std::uint64_t more = 0;          ///< after it, since the last look
     TimeNs incident_at_ns = kNever;  ///< of its last file
     std::uint64_t followed = 0;      ///< misses that belong to that file
+    std::optional<ScheduleWatch> schedule = {};
   };
   void count();
   static bool take_misses(Subject& subject);
@@ -60,6 +62,7 @@ class Supervisor {
   [[nodiscard]] Incident gather(const Subject& subject) const;
   void hush();
   void demote_if_runaway(Subject& subject);
+  void look_for_lost_pages();
 
   WatchBoard& board_;
   RunStatus& status_;
@@ -70,6 +73,7 @@ class Supervisor {
   std::string trace_why_not_;
   std::vector<Subject> subjects_;
   std::vector<BurstReport> bursts_;
+  std::uint64_t lost_pages_ = 0;
   std::vector<KernelEvent> kernel_events_;
   std::optional<CoreCounts> core_before_, core_within_;
   int core_ = -1;

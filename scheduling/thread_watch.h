@@ -66,6 +66,7 @@ class ThreadWatch {
   std::atomic<std::uint32_t> overruns_in_row{0};    ///< steps over budget, one after the other
   std::atomic<std::uint32_t> quiet{0};              ///< 1: no more reports wanted; written by the supervisor
   std::atomic<std::uint32_t> demoted{0};            ///< 1: no longer a real-time thread; written by the supervisor
+  std::atomic<std::uint32_t> stolen{0};             ///< 1: policy, priority or cores are not the table's; likewise
 
   /// On the thread itself, first of all. Realtime-safe: no.
   void attach() {

@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "rt/clock.h"
+#include "shm/bus_guard.h"
 #include "shm/directory.h"
 #include "shm/shm_file.h"
 
@@ -30,7 +31,8 @@ void copy_note(std::array<char, N>& to, std::string_view from) {
 }
 
 /// Writes to every page without changing it. MAP_POPULATE and mlock map shared pages for reading only: a processor that
-/// keeps no dirty bit itself (ARMv8.0, e.g. Cortex-A72) would fault on the first write to each, in the real-time thread.
+/// keeps no dirty bit itself (ARMv8.0, e.g. Cortex-A72) would fault on the first write to each, in the real-time
+/// thread.
 void touch_for_writing(void* base, std::size_t bytes) {
   constexpr std::size_t kSmallestPage = 4096;
   for (std::size_t at = 0; at < bytes; at += kSmallestPage)
@@ -62,6 +64,7 @@ Region Region::create(const std::string& name, std::span<const TopicSpec> specs,
   }
   void* base = mmap(nullptr, total, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_POPULATE, file.fd(), 0);
   if (base == MAP_FAILED) fail_errno(name, "mmap");
+  guard_mapping(name, base, total, true);
   touch_for_writing(base, total);
   region.base_ = static_cast<std::byte*>(base);
   region.bytes_ = total;
@@ -98,6 +101,7 @@ Region Region::attach(const std::string& name) {
   region.inode_ = st.st_ino;
   void* base = mmap(nullptr, region.bytes_, PROT_READ, MAP_SHARED | MAP_POPULATE, file.fd(), 0);
   if (base == MAP_FAILED) fail_errno(name, "mmap");
+  guard_mapping(name, base, region.bytes_, false);
   region.base_ = static_cast<std::byte*>(base);
   region.read_directory();
   return region;
@@ -130,6 +134,7 @@ void Region::map_bells(bool create) {
                     ? MAP_FAILED
                     : mmap(nullptr, kBellBytes, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_POPULATE, file.fd(), 0);
   if (bells == MAP_FAILED) fail(name_, "cannot map bells");
+  guard_mapping(name_ + "'s bells", bells, kBellBytes, true);
   touch_for_writing(bells, kBellBytes);
   bells_ = static_cast<rt::Bell*>(bells);
 }
@@ -194,6 +199,8 @@ bool Region::writer_alive() const {
 }
 
 void Region::unmap() noexcept {
+  for (const void* mapping : {static_cast<const void*>(base_), static_cast<const void*>(bells_)})
+    if (mapping != nullptr) forget_mapping(mapping);
   if (base_ != nullptr) munmap(base_, bytes_);
   if (bells_ != nullptr) munmap(bells_, kBellBytes);
   if (lock_fd_ >= 0) close(lock_fd_);

@@ -11,7 +11,7 @@ constexpr std::uint8_t kSystem = 1, kComponent = 1;
 constexpr std::uint64_t kTicksPerSecond = 200;
 constexpr std::size_t kMaxQueued = 64 * 1024;
 constexpr std::uint16_t kCommandSetMode = 176, kCommandReboot = 246, kCommandArm = 400, kCommandFailure = 420,
-                        kCommandClockStep = 31010;
+                        kCommandInterval = 511, kCommandClockStep = 31010;
 constexpr float kForce = 21196.f, kForceReboot = 20190226.f;
 constexpr DurationNs kRebootTime = 1500 * kMillisecond;
 constexpr std::uint8_t kIgnoreYawRate = 4, kIgnoreThrust = 64, kIgnoreAttitude = 128;
@@ -85,6 +85,12 @@ CommandResult AutopilotLink::obey(const mavlink::CommandLong& command, TimeNs no
       if (!(std::abs(command.param1) <= 1e9f)) return CommandResult::kDenied;
       clock_offset_ns_ += from_seconds(static_cast<double>(command.param1));
       return CommandResult::kAccepted;
+    case kCommandInterval: {
+      const bool possible = command.param1 == float{mavlink::Heartbeat::kId} && command.param2 >= 5000.f &&
+                            command.param2 <= 1e6f;  // of 200 ticks a second
+      if (possible) beat_every_ = static_cast<std::uint64_t>(command.param2 / 5000.f);
+      return possible ? CommandResult::kAccepted : CommandResult::kDenied;
+    }
     default:
       return CommandResult::kUnsupported;
   }
@@ -137,7 +143,7 @@ void AutopilotLink::step(const ImuSample& imu, TimeNs now_ns) {
   if (now_ns < silent_until_ns_) return;
   send_imu(imu, now_ns);
   if (ticks_ % 2 == 0) send_attitude(now_ns);
-  if (ticks_ % kTicksPerSecond == 0) send_heartbeat();
+  if (ticks_ % beat_every_ == 0) send_heartbeat();
   if (ticks_ % kTicksPerSecond == kTicksPerSecond / 2) {
     mavlink::Timesync request{};
     request.ts1 = own_time(now_ns);

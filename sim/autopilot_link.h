@@ -1,9 +1,10 @@
-// The autopilot's side of the serial line: MAVLink 2 as system 1, component 1. Sends HEARTBEAT 1 Hz,
+// The autopilot's side of the serial line: MAVLink 2 as system 1, component 1. Sends HEARTBEAT 1 Hz or as asked,
 // ATTITUDE_QUATERNION 100 Hz, HIGHRES_IMU 200 Hz, its own TIMESYNC requests 1 Hz, STATUSTEXT on events; answers
-// TIMESYNC; obeys COMMAND_LONG 400 (arm), 176 (mode), 246 (reboot: disarmed, 1.5 s of silence, its clock starts again;
-// denied while armed unless param6 is 20190226, as ArduPilot does), 420 (sensor failures, as PX4's simulation) and
-// 31010 (MAV_CMD_USER_1: its clock jumps by param1 seconds); acknowledges every command; follows SET_ATTITUDE_TARGET.
-// Its clock runs at an offset from the simulator's, so that a companion must synchronise.
+// TIMESYNC; obeys COMMAND_LONG 400 (arm), 176 (mode), 511 (its own HEARTBEAT's interval), 246 (reboot: disarmed, 1.5 s
+// of silence, its clock starts again; denied while armed unless param6 is 20190226, as ArduPilot does), 420 (sensor
+// failures, as PX4's simulation) and 31010 (MAV_CMD_USER_1: its clock jumps by param1 seconds); acknowledges every
+// command; follows SET_ATTITUDE_TARGET. Its clock runs at an offset from the simulator's, so that a companion must
+// synchronise.
 #pragma once
 
 #include <cstdint>
@@ -58,6 +59,7 @@ class AutopilotLink {
   TimeNs silent_until_ns_ = kNever;  ///< starting again
   std::vector<std::uint8_t> output_;
   std::uint64_t ticks_ = 0, frames_received_ = 0;
+  std::uint64_t beat_every_ = 200;  ///< ticks
 };
 
 /// Setpoint of a SET_ATTITUDE_TARGET; false when it must be ignored (masked attitude or thrust, numbers not finite, a

@@ -1,4 +1,5 @@
 #include "tools/iceoryx_export.h"
+#include "shm/bus_guard.h"
 
 #include <fmt/format.h>
 
@@ -10,7 +11,6 @@
 #include "tools/iceoryx_message.h"
 #include "tools/iceoryx_runtime.h"
 #include "tools/iceoryx_topics.h"
-#include "tools/record_bus_guard.h"
 
 namespace wasp::iceoryx {
 namespace {
@@ -155,7 +155,7 @@ namespace {
 
 int serve(const ExportOptions& options, Shared& shared) {
   if (const int code = connect(shared, options.wait_s); code != kDone || stop_requested()) return code;
-  tools::install_bus_guard();
+  shm::install_bus_guard();
   ExportSession session(options);
   session.poll();
   fmt::print("wasp-iceoryx: exporting instance {} as services {}/{}/TOPIC\n", options.instance, kService,

@@ -6,7 +6,7 @@
 #include <exception>
 #include <string_view>
 
-#include "tools/record_bus_guard.h"
+#include "shm/bus_guard.h"
 
 namespace wasp::tools {
 
@@ -31,13 +31,13 @@ bool Attachment::try_attach() {
   const auto before = file_id();
   if (!before) return false;
   try {
-    lost_pages_ = lost_pages();
+    lost_pages_ = shm::lost_pages();
     region_ = shm::Region::attach(name_);
   } catch (const std::exception& error) {
     tell(std::string("cannot attach: ") + error.what());
     return false;
   }
-  if (file_id() != before || lost_pages() != lost_pages_) {  // replaced between the two looks: next poll
+  if (file_id() != before || shm::lost_pages() != lost_pages_) {  // replaced between the two looks: next poll
     region_.reset();
     return false;
   }
@@ -69,7 +69,7 @@ void Attachment::detach() {
 }
 
 bool Attachment::truncated() const {
-  return lost_page_within(region_->at(0), static_cast<std::uint64_t>(file_.bytes), lost_pages_);
+  return shm::lost_page_within(region_->at(0), static_cast<std::uint64_t>(file_.bytes), lost_pages_);
 }
 
 bool Attachment::left_over() const {

@@ -10,7 +10,7 @@
 #include <cstdio>
 #include <exception>
 
-#include "tools/record_bus_guard.h"
+#include "shm/bus_guard.h"
 #include "tools/record_session.h"
 
 namespace {
@@ -55,7 +55,7 @@ int main(int argc, char** argv) {
   std::signal(SIGTERM, [](int) { stop_requested = true; });
   std::signal(SIGXFSZ, SIG_IGN);  // a limit on file sizes is a full disk, not an end
   std::signal(SIGINT, [](int) { stop_requested = true; });
-  wasp::tools::install_bus_guard();
+  wasp::shm::install_bus_guard();
   step_back();
   try {
     wasp::tools::RecordSession session(options);

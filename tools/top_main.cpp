@@ -12,7 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include "rt/clock.h"
-#include "tools/record_bus_guard.h"
+#include "shm/bus_guard.h"
 #include "tools/top_snapshot.h"
 #include "tools/top_text.h"
 
@@ -99,7 +99,7 @@ int main(int argc, char** argv) {
 
   std::signal(SIGTERM, [](int) { stop_requested = true; });
   std::signal(SIGINT, [](int) { stop_requested = true; });
-  tools::install_bus_guard();
+  shm::install_bus_guard();
   try {
     return watch(instance, once, json, period_s);
   } catch (const std::exception& error) {

@@ -67,6 +67,53 @@ TEST_F(ArbiterTest, NothingNonFinitePasses) {
     }
 }
 
+TEST_F(ArbiterTest, NothingAbsurdPassesInAnyField) {
+  for (float CueBody::*field : {&CueBody::height_m, &CueBody::height_sigma_m, &CueBody::heading_rate_radps,
+                                &CueBody::pitch_rad, &CueBody::velocity_forward_mps, &CueBody::velocity_right_mps,
+                                &CueBody::velocity_sigma_mps, &CueBody::climb_mps, &CueBody::climb_1ps})
+    for (const float bad : {1e30f, -1e30f, 2000.f, std::numeric_limits<float>::max(),
+                            std::numeric_limits<float>::quiet_NaN(), -std::numeric_limits<float>::infinity()}) {
+      give(0, height_cue(0, 1.f));
+      set.cues[0].body.*field = bad;
+      EXPECT_EQ(arbitrate(params, set, 1).height_source, -1) << bad;
+    }
+}
+
+TEST_F(ArbiterTest, ACueThatIsPublishedAgainAndAgainAgesByItsExposure) {
+  give(0, height_cue(0, 1.f));
+  for (TimeNs t = 0; t <= 300 * kMillisecond; t += 10 * kMillisecond) {
+    set.cues[0].finished_at_ns = t;  // new in the ring, old in its evidence
+    set.cues[0].step_index++;
+    EXPECT_EQ(arbitrate(params, set, t).height_source, t <= params.rows[0].age_limit_ns ? 0 : -1) << t;
+  }
+}
+
+TEST_F(ArbiterTest, FramesComeWhileAnyCueIsRecentBeItBlind) {
+  EXPECT_FALSE(arbitrate(params, set, 1).images);
+  give(2, Cue{});
+  EXPECT_TRUE(arbitrate(params, set, 1).images);
+  EXPECT_FALSE(arbitrate(params, set, params.rows[2].age_limit_ns + 1).images);
+}
+
+TEST_F(ArbiterTest, ABehaviourThatWasSwitchedOffIsAbsentButItsAvoidIsHeard) {
+  params.rows[0].heading_weight = 1.f;
+  Cue cue = height_cue(0, 1.f);
+  cue.body.has_heading_rate = 1;
+  cue.body.heading_rate_radps = 0.5f;
+  give(0, cue);
+  give(1, height_cue(0, 2.f));
+  set.off[0] = true;
+  Intention out = arbitrate(params, set, 1);
+  EXPECT_EQ(out.height_source, 1);
+  EXPECT_FALSE(out.steered);
+  EXPECT_EQ(out.heading_rate_radps, 0.f);
+  EXPECT_FALSE(out.avoid);
+  set.cues[0].body.avoid = 1;
+  out = arbitrate(params, set, 1);
+  EXPECT_TRUE(out.avoid);
+  EXPECT_FALSE(out.steered);
+}
+
 TEST_F(ArbiterTest, AvoidForbidsForwardPitch) {
   Cue forward;
   forward.body.validity = Validity::kValid;

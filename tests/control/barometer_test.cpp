@@ -76,7 +76,7 @@ TEST_F(Barometer, WithoutABelievablePressureThereIsNoHeight) {
 TEST(BarometerInControl, CuesThatComeLateDoNotTeachAZeroThatLags) {
   ControlParams p;
   p.arbiter.behaviour_count = 1;
-  p.arbiter.rows[0].height_rank = 0;
+  p.arbiter.rows[0] = {.age_limit_ns = 250 * kMillisecond, .height_rank = 0};
   p.barometer.enabled = true;
   p.mission.leg_count = 1;
   ControlState state;

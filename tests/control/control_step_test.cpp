@@ -427,6 +427,77 @@ TEST(ControlStep, EveryFallToHoldOrFailsafeIsLevelInOneTickWithinTheThrustsRate)
   }
 }
 
+TEST(ControlStep, ABarometricHeightDoesNotKeepASightlessVehicleCruising) {
+  ControlParams p = params();
+  p.barometer.enabled = true;
+  p.mission.legs[0].yaw_amplitude_radps = 1.f;  // a pilot's stick that would turn on
+  ControlInput in;
+  ControlState state;
+  ControlOutput out;
+  state = on_the_ground(p);
+  for (int i = 1; i < 80; ++i) {
+    in = good_input(i * 50 * kMillisecond);
+    in.autopilot.armed = in.autopilot.follows = i > 4;
+    in.pressure_hpa = 1000.f;
+    out = control_step(p, in, state);
+  }
+  ASSERT_EQ(out.command.mode, FlightMode::kBehaviour);
+  ASSERT_NE(out.command.yaw_rate_radps, 0.f);
+  const TimeNs last_exposure_ns = in.cues.cues[0].exposed_at_ns;
+  in.cues.cues[0].body.validity = Validity::kBlind;  // frames come, nothing is seen: the pilot flies on
+  for (int i = 0; i < 40; ++i) {
+    in.now_ns += 50 * kMillisecond;
+    in.attitude.exposed_at_ns = in.autopilot.heard_at_ns = in.now_ns;
+    if (i == 0) in.cues.cues[0].exposed_at_ns = in.now_ns - 40 * kMillisecond;
+    out = control_step(p, in, state);
+    const bool recent = in.now_ns - in.cues.cues[0].exposed_at_ns <= p.arbiter.rows[0].age_limit_ns;
+    EXPECT_EQ(out.command.mode, recent ? FlightMode::kBehaviour : FlightMode::kHold) << i;
+    if (!recent) {
+      EXPECT_EQ(out.command.yaw_rate_radps, 0.f);
+    }
+  }
+  EXPECT_GT(in.now_ns - last_exposure_ns, kSecond);
+  EXPECT_EQ(out.command.mode, FlightMode::kHold);  // and the barometer holds the height: no failsafe
+}
+
+/// The first level setpoint after the last good exposure, with ticks that fall as unluckily as they can.
+TEST(ControlStep, NeutralGoesOutWithin150MillisecondsOfTheLastGoodExposure) {
+  const ControlParams p = params();
+  for (DurationNs phase_ns = 0; phase_ns < 50 * kMillisecond; phase_ns += kMillisecond) {
+    ControlInput in;
+    ControlState state;
+    lean(p, in, state);
+    const TimeNs last_ns = in.now_ns - phase_ns;
+    TimeNs level_at_ns = 0;
+    for (int i = 1; i < 10 && level_at_ns == 0; ++i) {
+      ControlInput next = good_input(in.now_ns + i * 50 * kMillisecond);
+      next.cues = in.cues;
+      for (Cue& cue : next.cues.cues) cue.exposed_at_ns = last_ns;
+      if (control_step(p, next, state).command.q_ned_body[2] == 0.f) level_at_ns = next.now_ns;
+    }
+    ASSERT_NE(level_at_ns, 0);
+    EXPECT_LE(level_at_ns - last_ns, 145 * kMillisecond);
+  }
+}
+
+TEST(ControlStep, SilenceOfTheLinkIsAnsweredWithin300Milliseconds) {
+  const ControlParams p = params();
+  for (DurationNs phase_ns = 0; phase_ns < 50 * kMillisecond; phase_ns += kMillisecond) {
+    ControlInput in;
+    ControlState state;
+    lean(p, in, state);
+    const TimeNs last_ns = in.now_ns - phase_ns;
+    TimeNs answered_at_ns = 0;
+    for (int i = 1; i < 10 && answered_at_ns == 0; ++i) {
+      ControlInput next = good_input(in.now_ns + i * 50 * kMillisecond);
+      next.autopilot.heard_at_ns = last_ns;
+      if (control_step(p, next, state).command.reason == ModeReason::kLinkLost) answered_at_ns = next.now_ns;
+    }
+    ASSERT_NE(answered_at_ns, 0);
+    EXPECT_LE(answered_at_ns - last_ns, 290 * kMillisecond);
+  }
+}
+
 TEST(ControlStep, TheWayBackFromLevelKeepsTheTiltRate) {
   const ControlParams p = params();
   ControlInput in;

@@ -5,7 +5,12 @@
 namespace wasp::control {
 namespace {
 
-constexpr Situation kGood{true, true, true, true, true, false, true, false};
+constexpr Situation kGood{.autopilot_armed = true,
+                          .autopilot_follows = true,
+                          .link_alive = true,
+                          .attitude_fresh = true,
+                          .ground_seen = true,
+                          .images_fresh = true};
 
 FlightMode mode_in(Situation s) {
   ModeState state;
@@ -20,6 +25,8 @@ TEST(FlightMode, EveryLossHasItsNamedResponse) {
   EXPECT_EQ(mode_in(s), FlightMode::kHold);
   s.ground_lost_long = true;
   EXPECT_EQ(mode_in(s), FlightMode::kFailsafe);
+  s = kGood, s.images_fresh = false;  // a barometer may still know the height
+  EXPECT_EQ(mode_in(s), FlightMode::kHold);
   s = kGood, s.attitude_fresh = false;
   EXPECT_EQ(mode_in(s), FlightMode::kFailsafe);
   s = kGood, s.setpoint_finite = false;
@@ -35,9 +42,9 @@ TEST(FlightMode, EveryLossHasItsNamedResponse) {
 }
 
 TEST(FlightMode, DisarmedWinsOverEverythingAndManualOverVision) {
-  for (unsigned bits = 0; bits < 256; ++bits) {
+  for (unsigned bits = 0; bits < 512; ++bits) {
     const auto bit = [&](unsigned i) { return (bits >> i & 1u) != 0; };
-    const Situation s{bit(0), bit(1), bit(2), bit(3), bit(4), bit(5), bit(6), bit(7)};
+    const Situation s{bit(0), bit(1), bit(2), bit(3), bit(4), bit(5), bit(6), bit(7), bit(8)};
     const FlightMode mode = mode_in(s);
     if (!s.autopilot_armed) {
       EXPECT_EQ(mode, FlightMode::kDisarmed);
@@ -45,7 +52,8 @@ TEST(FlightMode, DisarmedWinsOverEverythingAndManualOverVision) {
       EXPECT_EQ(mode, FlightMode::kManual);
     }
     if (mode == FlightMode::kBehaviour) {
-      EXPECT_TRUE(s.link_alive && s.attitude_fresh && s.ground_seen && s.setpoint_finite);
+      EXPECT_TRUE(s.link_alive && s.attitude_fresh && s.ground_seen && s.images_fresh && s.setpoint_finite &&
+                  !s.deadlines_missed);
     }
   }
 }

@@ -74,6 +74,42 @@ TEST(Mission, DisarmedInFlightItNeverArmsAgain) {
   EXPECT_EQ(v.state.phase, MissionPhase::kBroken);
 }
 
+TEST(Mission, AsksForNoArmingWhileSomethingOfOursIsAmiss) {
+  Obedient v = standing();
+  v.input.may_arm = false;
+  v.run(20);
+  EXPECT_EQ(v.state.phase, MissionPhase::kWait);
+  EXPECT_FALSE(v.input.armed);
+  v.input.may_arm = true;
+  EXPECT_FALSE(v.step().armed);
+  ASSERT_EQ(v.state.phase, MissionPhase::kArm);
+  v.input.may_arm = false;  // it came while the autopilot was being asked
+  EXPECT_FALSE(v.step().armed);
+  v.input.may_arm = true;
+  EXPECT_TRUE(v.step().armed);
+  v.input.may_arm = false;  // in the air it bars nothing: a landing needs the rotors
+  v.run(20);
+  EXPECT_EQ(leg_of(v.state.phase), 0);
+}
+
+/// Whatever an autopilot does after the flight began, nothing of ours asks to arm again.
+TEST(Mission, HavingFlownItNeverAsksToArmAgainWhateverTheAutopilotDoes) {
+  for (unsigned pattern = 0; pattern < 256; ++pattern) {
+    Obedient v = standing();
+    v.run(30);
+    ASSERT_EQ(leg_of(v.state.phase), 0);
+    for (int i = 0; i < 400; ++i) {
+      v.input.armed = (pattern >> (i / 8 % 8) & 1) != 0;
+      v.input.follows = (pattern >> (i / 5 % 8) & 1) != 0;
+      v.input.heard = i % 11 != 0;
+      mission_step(v.params, v.input, v.state);
+      v.input.now_ns += 50 * kMillisecond;
+      EXPECT_NE(v.state.phase, MissionPhase::kArm);
+      EXPECT_NE(v.state.phase, MissionPhase::kWait);
+    }
+  }
+}
+
 TEST(Mission, ALandingThatNeverEndsIsBrokenOff) {
   Obedient v = standing();
   v.run(60);

@@ -56,6 +56,10 @@ TEST_F(ConfigTest, ShippedDefaultsLoadAndMatchTheBuiltInOnes) {
   EXPECT_FLOAT_EQ(file.control.altitude_hold.mass_kg, built_in.control.altitude_hold.mass_kg);
   EXPECT_EQ(file.control_thread.priority, built_in.control_thread.priority);
   EXPECT_EQ(file.control.link_age_limit_ns, built_in.control.link_age_limit_ns);
+  // The promises of docs/faults.md: limit, one tick, and 5 ms for the tick itself.
+  EXPECT_LE(file.control.link_age_limit_ns + file.control_period_ns, 295 * kMillisecond);
+  for (const auto& row : file.control.arbiter.rows)
+    EXPECT_LE(row.age_limit_ns + file.control_period_ns, 145 * kMillisecond);
   for (std::size_t i = 0; i < names.size(); ++i) {
     EXPECT_EQ(file.behaviours[i].enabled, i < kNames.size()) << names[i];
     EXPECT_EQ(file.behaviours[i].enabled, built_in.behaviours[i].enabled);

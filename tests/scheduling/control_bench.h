@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include <atomic>
+#include <span>
 #include <string>
 #include <thread>
 #include <variant>
@@ -45,6 +46,10 @@ class PtyLine {
     for (ssize_t n; (n = ::read(master_, chunk.data(), chunk.size())) > 0;)
       all.insert(all.end(), chunk.begin(), chunk.begin() + n);
     return all;
+  }
+  /// The autopilot speaks.
+  void write(std::span<const std::uint8_t> bytes) {
+    EXPECT_EQ(::write(master_, bytes.data(), bytes.size()), std::ssize(bytes));
   }
 
  private:
@@ -111,6 +116,8 @@ class ControlBench {
   }
   /// The next tick is held up before its write.
   void stall_once(DurationNs duration_ns) { stall_ns_ = duration_ns; }
+  /// Every tick is, until told otherwise (0).
+  void stall_always(DurationNs duration_ns) { always_ns_ = duration_ns; }
   /// The tick that was held up; 0 while none was.
   [[nodiscard]] std::uint64_t stalled_tick() const { return stalled_tick_.load(); }
 
@@ -132,6 +139,9 @@ class ControlBench {
   }
   bool wait_for_tick(std::uint64_t tick) {
     return wait_for_command([tick](const Command& c) { return c.tick >= tick; });
+  }
+  bool wait_for_more_ticks(std::uint64_t ticks) {
+    return wait_for_command([](const Command&) { return true; }) && wait_for_tick(commands.back().tick + ticks);
   }
   [[nodiscard]] const Command* command_of(std::uint64_t tick) const {
     for (const auto& c : commands)
@@ -166,13 +176,19 @@ class ControlBench {
       if (t.find(words) != std::string::npos) return true;
     return false;
   }
+  /// False if nothing of the kind is said within a minute.
+  bool wait_for_said(const std::string& words) {
+    for (int i = 0; i < 30'000 && !said(words); ++i) rt::sleep_until(rt::now() + 2 * kMillisecond);
+    return said(words);
+  }
   StageTable& stages() { return stage_table(flight_); }
   RunStatus& status() { return run_status(flight_); }
   [[nodiscard]] DurationNs period_ns() const { return config_.control_period_ns; }
   shm::Region& flight_region() { return flight_; }
 
   LoopControl control;
-  std::atomic<bool> cues_stop{false}, attitude_stops{false}, autopilot_refuses{false}, autopilot_leaves{false};
+  std::atomic<bool> cues_stop{false}, attitude_stops{false}, autopilot_refuses{false}, autopilot_leaves{false},
+      disarmed_for_good{false};
   WatchBoard board;
   ThreadWatch* watch;
   std::vector<Command> commands;
@@ -194,6 +210,8 @@ class ControlBench {
   }
   static void stall(void* self, std::uint64_t tick) WASP_REALTIME {
     auto* bench = static_cast<ControlBench*>(self);
+    if (const DurationNs every_ns = bench->always_ns_.load(); every_ns > 0)
+      return rt::sleep_until(rt::now() + every_ns);
     const DurationNs stall_ns = bench->stall_ns_.exchange(0);
     if (stall_ns == 0) return;
     rt::sleep_until(rt::now() + stall_ns);
@@ -222,6 +240,7 @@ class ControlBench {
     if (commands_now_.copy_newest(command) &&
         command.mission_phase == static_cast<std::uint8_t>(control::MissionPhase::kArm))
       armed_ = armed_ || !autopilot_refuses;
+    if (disarmed_for_good) armed_ = false;
     report_.store({now_ns, armed_ ? 1u : 0u, armed_ && !autopilot_leaves ? 1u : 0u});
   }
   void take_commands() {
@@ -244,7 +263,7 @@ class ControlBench {
   EventQueue events_;
   mavlink::Parser parser_;
   std::vector<std::string> texts_;
-  std::atomic<DurationNs> stall_ns_{0};
+  std::atomic<DurationNs> stall_ns_{0}, always_ns_{0};
   std::atomic<std::uint64_t> stalled_tick_{0};
   bool armed_ = false;
   int inertial_samples_ = 0;

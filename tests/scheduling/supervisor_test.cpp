@@ -3,11 +3,13 @@
 
 #include <gtest/gtest.h>
 #include <stdlib.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "shm/bus_guard.h"
 #include "tests/scheduling/control_bench.h"
 
 namespace wasp::scheduling {
@@ -177,6 +179,56 @@ TEST_F(SupervisorTest, AFolderThatCannotBeWrittenIsSaidOnceAndTheFlightGoesOn) {
   EXPECT_EQ(said(options_.incident_dir), 1);
   EXPECT_EQ(log_.size(), 1u);
   EXPECT_EQ(board.frozen.load(), 0u);
+}
+
+TEST_F(SupervisorTest, LostPagesAreCountedAndNamed) {
+  options_.incidents = 0;
+  shm::install_bus_guard();
+  const std::string name = "test-lost-" + std::to_string(getpid());
+  const shm::Region region =
+      shm::Region::create(name, std::vector<shm::TopicSpec>{{"data", "T", shm::TopicKind::kBlock, 1, 5 * shm::kPage}});
+  WatchBoard board;
+  Supervisor supervisor(board, status_, options_, logger());
+  supervisor.look();
+  ASSERT_EQ(truncate(("/dev/shm/" + name).c_str(), 0), 0);
+  for (std::size_t page = 0; page < 3; ++page)
+    EXPECT_EQ(*reinterpret_cast<const volatile std::uint64_t*>(region.at(page * shm::kPage)), 0u);
+  supervisor.look();
+  supervisor.look();
+  EXPECT_EQ(said("shared memory lost: 3 pages of " + name), 1);
+  EXPECT_EQ(status_.pages_lost.load(), 3u);
+  shm::Region::remove(name);
+}
+
+TEST_F(SupervisorTest, ACoreStolenFromControlIsSaidWithinOneLookAndBarsArming) {
+  cpu_set_t all;
+  ASSERT_EQ(sched_getaffinity(0, sizeof all, &all), 0);
+  if (CPU_COUNT(&all) < 2) GTEST_SKIP() << "one core only";
+  options_.real_time = false;
+  options_.incidents = 0;
+  const int core = rt::nearest_usable_core(0);
+  ControlBench bench({.control_thread = {.name = "control", .core = core}});
+  bench.autopilot_refuses = true;
+  Supervisor supervisor(bench.board, bench.status(), options_, logger());
+  bench.start();
+  ASSERT_TRUE(bench.wait_for_tick(3));
+  for (int i = 0; i <= ScheduleWatch::kTakeBacks; ++i) {  // once more than it is taken back
+    ASSERT_EQ(sched_setaffinity(bench.watch->tid.load(), sizeof all, &all), 0);
+    supervisor.look();
+  }
+  EXPECT_EQ(bench.status().schedule_thefts.load(), 4u);
+  EXPECT_EQ(said("control: SCHED_OTHER on core"), 4);
+  ASSERT_TRUE(bench.wait_for_said("not arming: control does not run as the thread table says"));
+  bench.wire();
+  ASSERT_TRUE(bench.wait_for_more_ticks(30));
+  for (const auto& m : bench.wire()) EXPECT_EQ(std::get_if<mavlink::CommandLong>(&m), nullptr);  // nothing is asked
+  cpu_set_t own;
+  CPU_ZERO(&own);
+  CPU_SET(core, &own);
+  ASSERT_EQ(sched_setaffinity(bench.watch->tid.load(), sizeof own, &own), 0);
+  supervisor.look();
+  bench.autopilot_refuses = false;
+  EXPECT_TRUE(bench.wait_until_flying());
 }
 
 TEST_F(SupervisorTest, NoIncidentsWantedMeansNoFileAndNoWord) {
