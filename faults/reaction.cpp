@@ -43,18 +43,21 @@ void read_setpoints(const WireReader& wire, const Trial& trial, Reaction& r) {
   if (r.recovered_ms) until_ns = std::min(until_ns, trial.ended_ns + from_seconds(*r.recovered_ms * 1e-3));
   const Setpoint* last_steering = nullptr;
   const Setpoint* first_after = nullptr;
+  TimeNs last_ns = trial.began_ns;
   for (const Setpoint& s : wire.setpoints) {
     if (s.at_ns < trial.began_ns) continue;
     if (s.at_ns >= until_ns) break;
+    last_ns = s.at_ns;
     if (!s.neutral())
       last_steering = &s, first_after = nullptr;
     else if (first_after == nullptr)
       first_after = &s;
   }
-  r.stream_ended = first_after == nullptr;
+  constexpr DurationNs kSilence = 500 * kMillisecond;  // the autopilot's own failsafe acts by then
+  r.stream_ended = until_ns - last_ns > kSilence;
   if (first_after != nullptr)
     r.response_ms = ms_between(trial.began_ns, first_after->at_ns);
-  else
+  else if (r.stream_ended)
     r.response_ms = last_steering == nullptr ? 0 : ms_between(trial.began_ns, last_steering->at_ns);
 }
 

@@ -139,7 +139,7 @@ WireEvidence SharedFlight::evidence() const {
   e.unseen = flight.watch().exposures_unseen();
   TimeNs guardian_since_ns = kNever;
   for (const CompanionBeat& beat : flight.wire().beats) {
-    if (beat.state.guardian && guardian_since_ns == kNever) guardian_since_ns = beat.at_ns - kSecond;
+    if (beat.state.guardian && guardian_since_ns == kNever) guardian_since_ns = beat.at_ns - 100 * kMillisecond;
     if (beat.state.guardian || guardian_since_ns == kNever) continue;
     e.not_joined.push_back({guardian_since_ns, beat.at_ns});
     guardian_since_ns = kNever;
@@ -150,7 +150,7 @@ WireEvidence SharedFlight::evidence() const {
     const bool silent =
         f.promise == Promise::kGuardian || f.promise == Promise::kLineBack || f.promise == Promise::kEnds || f.noisy;
     if (silent) e.gaps_excused.push_back({d.trial.began_ns, d.trial.watched_until_ns});
-    if (f.promise == Promise::kGuardian || f.injector == Injector::kSignal)
+    if (f.promise == Promise::kGuardian || f.promise == Promise::kEnds)
       e.not_joined.push_back({d.trial.began_ns - 100 * kMillisecond, d.trial.watched_until_ns});
     if (f.tainted_after_ms > 0)
       e.tainted.push_back({d.trial.began_ns + from_seconds(f.tainted_after_ms * 1e-3), d.trial.ended_ns});
