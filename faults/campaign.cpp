@@ -103,8 +103,8 @@ class Campaign {
     plan.folder = options_.out / plan.instance;
     const std::size_t before = g.cells.size();
     try {
-      SharedFlight flight(options_, plan, hooks_.interrupted);
-      for (const CellResult& result : flight.fly(g.cells)) finish(result);
+      SharedFlight flight(options_, plan, hooks_);
+      for (const CellResult& result : flight.fly(g.cells, results_.size(), total_)) finish(result);
     } catch (const std::exception& error) {
       if (g.cells.size() < before) throw;  // of our own making
       finish({.cell = g.cells.front(), .verdict = Verdict::kMiss, .why = error.what()});
@@ -114,7 +114,8 @@ class Campaign {
 
   void finish(const CellResult& result) {
     results_.push_back(result);
-    hooks_.done(result, results_.size(), total_);
+    hooks_.judged(result);
+    hooks_.tried(results_.size(), total_);
   }
 
   const CampaignOptions& options_;

@@ -52,7 +52,8 @@ std::vector<Cell> select_cells(const CampaignOptions& options);
 
 struct CampaignHooks {
   std::function<bool()> interrupted = [] { return false; };
-  std::function<void(const CellResult&, std::size_t done, std::size_t of)> done = [](auto&&...) {};
+  std::function<void(std::size_t tried, std::size_t of)> tried = [](auto&&...) {};  ///< not judged yet: progress
+  std::function<void(const CellResult&)> judged = [](auto&&...) {};
 };
 
 /// Flies them all. Never throws for what a flight does; a cell that could not be flown is a MISS.

@@ -85,10 +85,8 @@ int fly(const Options& o) {
   const TimeNs began_ns = rt::now();
   CampaignHooks hooks;
   hooks.interrupted = [] { return stop_requested.load(); };
-  hooks.done = [&](const CellResult& result, std::size_t done, std::size_t of) {
-    std::cout << table_row(result) << "\n" << std::flush;
-    line.show(remaining(began_ns, done, of), done == of);
-  };
+  hooks.tried = [&](std::size_t tried, std::size_t of) { line.show(remaining(began_ns, tried, of), tried == of); };
+  hooks.judged = [](const CellResult& result) { std::cout << table_row(result) << "\n" << std::flush; };
   if (o.negative) return run_negative(campaign, abilities, hooks);
   std::cout << table_head() << "\n" << std::flush;
   const std::vector<CellResult> results = run_campaign(campaign, abilities, hooks);

@@ -43,18 +43,21 @@ void read_setpoints(const WireReader& wire, const Trial& trial, Reaction& r) {
   if (r.recovered_ms) until_ns = std::min(until_ns, trial.ended_ns + from_seconds(*r.recovered_ms * 1e-3));
   const Setpoint* last_steering = nullptr;
   const Setpoint* first_after = nullptr;
+  TimeNs last_ns = trial.began_ns;
   for (const Setpoint& s : wire.setpoints) {
     if (s.at_ns < trial.began_ns) continue;
     if (s.at_ns >= until_ns) break;
+    last_ns = s.at_ns;
     if (!s.neutral())
       last_steering = &s, first_after = nullptr;
     else if (first_after == nullptr)
       first_after = &s;
   }
-  r.stream_ended = first_after == nullptr;
+  constexpr DurationNs kSilence = 500 * kMillisecond;  // the autopilot's own failsafe acts by then
+  r.stream_ended = until_ns - last_ns > kSilence;
   if (first_after != nullptr)
     r.response_ms = ms_between(trial.began_ns, first_after->at_ns);
-  else
+  else if (r.stream_ended)
     r.response_ms = last_steering == nullptr ? 0 : ms_between(trial.began_ns, last_steering->at_ns);
 }
 
@@ -62,20 +65,24 @@ struct Bar {
   const char* name;
   double limit_ms;
   const std::optional<double>& measured_ms;
+  TimeNs since_ns;
 };
 
 constexpr double kNotExplained = std::numeric_limits<double>::infinity();
 
 /// What is late or missing of what the promise asks for.
-std::optional<Breach> late(const Fault& fault, const Reaction& r, bool times) {
+std::optional<Breach> late(const Fault& fault, const Trial& trial, const Reaction& r, bool times) {
+  const bool restart = fault.promise == Promise::kGuardian;
   for (const Bar& bar :
-       {Bar{"detected", fault.detected_ms, r.detected_ms}, Bar{"response", fault.response_ms, r.response_ms},
-        Bar{"recovered", fault.recovered_ms, r.recovered_ms}}) {
+       {Bar{"detected", fault.detected_ms, r.detected_ms, trial.began_ns},
+        Bar{"response", fault.response_ms, r.response_ms, trial.began_ns},
+        Bar{"recovered", fault.recovered_ms, r.recovered_ms, restart ? trial.began_ns : trial.ended_ns}}) {
     if (bar.limit_ms <= 0) continue;
     if (!bar.measured_ms) return Breach{fmt::format("not {}", bar.name), kNotExplained};
     if (times && *bar.measured_ms > bar.limit_ms + 1e-3)
       return Breach{fmt::format("{} after {:.1f} ms, promised {:.0f}", bar.name, *bar.measured_ms, bar.limit_ms),
-                    *bar.measured_ms - bar.limit_ms};
+                    *bar.measured_ms - bar.limit_ms,
+                    {bar.since_ns, bar.since_ns + from_seconds(*bar.measured_ms * 1e-3)}};
   }
   return std::nullopt;
 }
@@ -108,7 +115,7 @@ bool answers_in(const Fault& fault, Phase phase) {
   return phase != Phase::kIdle || fault.promise == Promise::kGuardian || fault.promise == Promise::kLineBack;
 }
 
-std::optional<Breach> breach_of(const Fault& fault, Phase phase, const Reaction& r, bool times) {
+std::optional<Breach> breach_of(const Fault& fault, const Trial& trial, Phase phase, const Reaction& r, bool times) {
   switch (fault.promise) {
     case Promise::kUnaffected:
       if (r.alarmed || r.guardian) return Breach{"alarm without cause", kNotExplained};
@@ -117,15 +124,15 @@ std::optional<Breach> breach_of(const Fault& fault, Phase phase, const Reaction&
       if (phase == Phase::kIdle)  // nothing to be said for: it commands nothing
         return r.recovered_ms ? std::nullopt : std::optional(Breach{"not started again", kNotExplained});
       if (!r.guardian) return Breach{"the guardian did not speak", kNotExplained};
-      return late(fault, r, times);
+      return late(fault, trial, r, times);
     case Promise::kNeutral:
       if (!answers_in(fault, phase)) return std::nullopt;
       if (!r.alarmed) return Breach{"no alarm", kNotExplained};
-      return late(fault, r, times);
+      return late(fault, trial, r, times);
     case Promise::kReported:
     case Promise::kLineBack:
       if (!answers_in(fault, phase)) return std::nullopt;
-      return late(fault, r, times);
+      return late(fault, trial, r, times);
     case Promise::kBounded:
     case Promise::kEnds:
     case Promise::kRefused:

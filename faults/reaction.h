@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "faults/fault.h"
+#include "faults/stretch.h"
 #include "faults/wire_reader.h"
 #include "types/messages.h"
 
@@ -38,6 +39,7 @@ Reaction react(const WireReader& wire, const Trial& trial);
 struct Breach {
   std::string why;
   double excess_ms = 0;  ///< late by; infinite: it never came, or no delay of the host explains it
+  Stretch waited = {};   ///< from the cause until it came
 };
 
 /// For a flight process that was started again: since the fault began, by the new process' first tick in the command
@@ -45,7 +47,8 @@ struct Breach {
 void read_restart(const std::vector<Command>& commands, const Trial& trial, Reaction& reaction);
 
 /// What is wrong with a reaction by the fault's promise. Without `times`, only whether it came.
-std::optional<Breach> breach_of(const Fault& fault, Phase phase, const Reaction& reaction, bool times);
+std::optional<Breach> breach_of(const Fault& fault, const Trial& trial, Phase phase, const Reaction& reaction,
+                                bool times);
 
 /// For a line that was gone: seen when the flight's log says so, recovered from with the first setpoint after its end.
 void read_line(const WireReader& wire, const Trial& trial, TimeNs gone_logged_ns, Reaction& reaction);

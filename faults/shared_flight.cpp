@@ -16,7 +16,8 @@ constexpr double kReach_s = 60, kSettle_s = 20;                      // to the p
 constexpr double kRecover_s = 4, kGenerous_s = 40, kLanding_s = 15;  // after a fault, with times judged and without
 constexpr double kAfterwards_s = 0.6;                                // watched after the recovery
 constexpr DurationNs kOverrun = kMillisecond;                        // of the reference loop: one of its periods
-constexpr float kCorridorEnd_m = 22.f;                               // of 30
+constexpr double kNotExplained = std::numeric_limits<double>::infinity();
+constexpr float kCorridorEnd_m = 22.f;  // of 30
 
 /// Promises after which the flight does not command any more.
 bool final(const Fault& fault) {
@@ -25,10 +26,18 @@ bool final(const Fault& fault) {
 
 bool shares(Phase phase) { return phase == Phase::kIdle || phase == Phase::kHover || phase == Phase::kCruise; }
 
-DurationNs reference_late_ns(const std::vector<tools::Wakeup>& reference, TimeNs from_ns, TimeNs until_ns) {
+DurationNs reference_late_ns(const std::vector<tools::Wakeup>& reference, const Stretch& within) {
   DurationNs sum = 0;
   for (const tools::Wakeup& w : reference)
-    if (w.due_at_ns + w.late_ns >= from_ns && w.due_at_ns <= until_ns && w.late_ns >= kOverrun) sum += w.late_ns;
+    if (w.due_at_ns + w.late_ns >= within.from_ns && w.due_at_ns <= within.until_ns && w.late_ns >= kOverrun)
+      sum += w.late_ns;
+  return sum;
+}
+
+DurationNs overlap_ns(const std::vector<Stretch>& stretches, const Stretch& with) {
+  DurationNs sum = 0;
+  for (const Stretch& s : stretches)
+    sum += std::max<DurationNs>(0, std::min(s.until_ns, with.until_ns) - std::max(s.from_ns, with.from_ns));
   return sum;
 }
 
@@ -36,23 +45,22 @@ DurationNs reference_late_ns(const std::vector<tools::Wakeup>& reference, TimeNs
 double excess_ms(const Violation& v, const WireLimits& limits) {
   if (v.offence == Offence::kGap) return v.value - to_seconds(limits.longest_gap_ns) * 1e3;
   if (v.offence == Offence::kOldEvidence) return v.value - to_seconds(limits.cue_age_ns) * 1e3;
-  return std::numeric_limits<double>::infinity();
+  return kNotExplained;
 }
 
 }  // namespace
 
-SharedFlight::SharedFlight(const CampaignOptions& options, const FlightPlan& plan,
-                           const std::function<bool()>& interrupted)
-    : options_(options), plan_(plan), interrupted_(interrupted), flight_(plan_) {}
+SharedFlight::SharedFlight(const CampaignOptions& options, const FlightPlan& plan, const CampaignHooks& hooks)
+    : options_(options), plan_(plan), hooks_(hooks), flight_(plan_) {}
 
 /// False when the flight ended, or we were interrupted, before.
 bool SharedFlight::sleep_until(TimeNs until_ns) {
-  while (rt::now() < until_ns && flight_.running() && !interrupted_())
+  while (rt::now() < until_ns && flight_.running() && !hooks_.interrupted())
     rt::sleep_until(std::min(until_ns, rt::now() + 10 * kMillisecond));
   return rt::now() >= until_ns;
 }
 
-std::vector<CellResult> SharedFlight::fly(std::deque<Cell>& queue) {
+std::vector<CellResult> SharedFlight::fly(std::deque<Cell>& queue, std::size_t before, std::size_t total) {
   const bool there = flight_.wait_for(plan_.phase, kReach_s);
   if (!there) {
     CellResult result{.cell = queue.front(), .verdict = Verdict::kMiss, .why = "the flight never came so far"};
@@ -67,11 +75,12 @@ std::vector<CellResult> SharedFlight::fly(std::deque<Cell>& queue) {
       break;  // the end of the corridor
     queue.pop_front();
     done_.push_back(try_cell(cell));
+    hooks_.tried(before + done_.size(), total);
     if (final(*cell.fault) || options_.isolate || !shares(plan_.phase)) break;
     const TimeNs patience_ns = rt::now() + from_seconds(kSettle_s);
-    while (!flight_.settled(plan_.phase) && flight_.running() && rt::now() < patience_ns && !interrupted_())
+    while (!flight_.settled(plan_.phase) && flight_.running() && rt::now() < patience_ns && !hooks_.interrupted())
       rt::sleep_until(rt::now() + 10 * kMillisecond);
-  } while (!queue.empty() && flight_.settled(plan_.phase) && !interrupted_());
+  } while (!queue.empty() && flight_.settled(plan_.phase) && !hooks_.interrupted());
   flight_.end(shares(plan_.phase) ? 3 : 20);
   return judge();
 }
@@ -105,7 +114,7 @@ void SharedFlight::wait_for_answer(const Cell& cell) {
     if (fault.promise != Promise::kGuardian) return flight_.commanded(plan_.phase);
     return cell.phase == Phase::kIdle ? flight_.watch().counts().incarnation > 0 : !flight_.running();
   };
-  while (rt::now() < until_ns && flight_.running() && !interrupted_() && !answered())
+  while (rt::now() < until_ns && flight_.running() && !hooks_.interrupted() && !answered())
     rt::sleep_until(rt::now() + 10 * kMillisecond);
   sleep_until(rt::now() + from_seconds(kAfterwards_s));
 }
@@ -130,7 +139,7 @@ WireEvidence SharedFlight::evidence() const {
   e.unseen = flight.watch().exposures_unseen();
   TimeNs guardian_since_ns = kNever;
   for (const CompanionBeat& beat : flight.wire().beats) {
-    if (beat.state.guardian && guardian_since_ns == kNever) guardian_since_ns = beat.at_ns - kSecond;
+    if (beat.state.guardian && guardian_since_ns == kNever) guardian_since_ns = beat.at_ns - 100 * kMillisecond;
     if (beat.state.guardian || guardian_since_ns == kNever) continue;
     e.not_joined.push_back({guardian_since_ns, beat.at_ns});
     guardian_since_ns = kNever;
@@ -141,7 +150,7 @@ WireEvidence SharedFlight::evidence() const {
     const bool silent =
         f.promise == Promise::kGuardian || f.promise == Promise::kLineBack || f.promise == Promise::kEnds || f.noisy;
     if (silent) e.gaps_excused.push_back({d.trial.began_ns, d.trial.watched_until_ns});
-    if (f.promise == Promise::kGuardian || f.injector == Injector::kSignal)
+    if (f.promise == Promise::kGuardian || f.promise == Promise::kEnds)
       e.not_joined.push_back({d.trial.began_ns - 100 * kMillisecond, d.trial.watched_until_ns});
     if (f.tainted_after_ms > 0)
       e.tainted.push_back({d.trial.began_ns + from_seconds(f.tainted_after_ms * 1e-3), d.trial.ended_ns});
@@ -181,39 +190,39 @@ CellResult SharedFlight::judge(const Done& d, const WireLimits& limits, const st
   const auto belongs = [&](const Violation& v) { return only || (v.at_ns >= d.trial.began_ns && v.at_ns < next_ns); };
   std::ranges::copy_if(violations, std::back_inserter(r.violations), belongs);
 
-  DurationNs late_ns =
-      fault.noisy ? 0 : reference_late_ns(reference, d.trial.began_ns - kSecond, d.trial.watched_until_ns);
-  for (const Stretch& stall : flight_.tap().stalls())  // our own lateness is nobody's fault
-    if (stall.until_ns > d.trial.began_ns && stall.from_ns < d.trial.watched_until_ns)
-      late_ns += stall.until_ns - stall.from_ns;
-  const auto blame = [&](const std::string& why, double excess) {
-    const bool noise = excess < 0 || (late_ns > 0 && excess <= to_seconds(late_ns) * 1e3 + 1);
-    const Verdict verdict = noise ? Verdict::kHostNoise : Verdict::kMiss;
-    if (r.verdict == Verdict::kMiss) return;
-    r.verdict = verdict;
-    r.why = noise && excess >= 0
-                ? fmt::format("{} (reference or tap late by {:.1f} ms)", why, to_seconds(late_ns) * 1e3)
-                : why;
+  const std::vector<Stretch> stalls = flight_.tap().stalls();
+  const auto host_late_ms = [&](const Stretch& waited) {
+    return to_seconds((fault.noisy ? 0 : reference_late_ns(reference, waited)) + overlap_ns(stalls, waited)) * 1e3;
   };
-  constexpr double kNotExplained = std::numeric_limits<double>::infinity();
-  if (!d.error.empty()) blame(d.error, kNotExplained);
-  if (const auto breach = breach_of(fault, d.cell.phase, r.reaction, options_.times))
-    blame(breach->why, breach->excess_ms);
-  for (const Violation& v : r.violations)
-    if (const double excess = excess_ms(v, limits); excess <= v.held_ms)
-      blame(fmt::format("{} on the wire ({:.3g}), held by the line", name_of(v.offence), v.value), -1);
-    else
-      blame(fmt::format("{} on the wire ({:.3g})", name_of(v.offence), v.value), excess);
+  const auto blame = [&](const std::string& why, double excess, const Stretch& waited) {
+    const double late_ms = excess < kNotExplained ? host_late_ms(waited) : 0;
+    const bool noise = late_ms > 0 && excess <= late_ms + 1;
+    if (r.verdict == Verdict::kMiss || (r.verdict == Verdict::kHostNoise && noise)) return;
+    r.verdict = noise ? Verdict::kHostNoise : Verdict::kMiss;
+    r.why = noise ? fmt::format("{} (the host stood still for {:.1f} ms)", why, late_ms) : why;
+  };
+  const auto blame_for_good = [&](const std::string& why) { blame(why, kNotExplained, {}); };
+  if (!d.error.empty()) blame_for_good(d.error);
+  if (const auto breach = breach_of(fault, d.trial, d.cell.phase, r.reaction, options_.times))
+    blame(breach->why, breach->excess_ms, breach->waited);
+  for (const Violation& v : r.violations) {
+    const std::string why = fmt::format("{} on the wire ({:.3g})", name_of(v.offence), v.value);
+    const double excess = excess_ms(v, limits);
+    if (excess > v.held_ms)
+      blame(why, excess, {v.at_ns - kSecond, v.at_ns});
+    else if (r.verdict == Verdict::kOk)
+      r.verdict = Verdict::kHostNoise, r.why = why + fmt::format(", held by the line for {:.1f} ms", v.held_ms);
+  }
   const bool may_end = final(fault) || !shares(plan_.phase);
-  if (!may_end && d.outcome != "goes on") blame("the flight did not go on: " + d.outcome, kNotExplained);
+  if (!may_end && d.outcome != "goes on") blame_for_good("the flight did not go on: " + d.outcome);
   if (d.counts.incarnation > 0 && fault.promise != Promise::kGuardian)
-    blame("the flight process died and was started again", kNotExplained);
-  if (d.crashed && fault.id != "guardian-killed") blame("crashed: " + d.outcome, kNotExplained);
+    blame_for_good("the flight process died and was started again");
+  if (d.crashed && fault.id != "guardian-killed") blame_for_good("crashed: " + d.outcome);
   if (!fault.says.empty() && answers_in(fault, d.cell.phase)) {
     const bool said = std::ranges::any_of(log, [&](const LogLine& l) {
       return l.at_ns >= d.trial.began_ns - kSecond && l.text.find(fault.says) != std::string::npos;
     });
-    if (!said) blame(fmt::format("nobody says '{}'", fault.says), kNotExplained);
+    if (!said) blame_for_good(fmt::format("nobody says '{}'", fault.says));
   }
   return r;
 }

@@ -13,11 +13,11 @@ namespace wasp::faults {
 
 class SharedFlight {
  public:
-  SharedFlight(const CampaignOptions& options, const FlightPlan& plan, const std::function<bool()>& interrupted);
+  SharedFlight(const CampaignOptions& options, const FlightPlan& plan, const CampaignHooks& hooks);
 
   /// Takes cells from the front of `queue` as long as the flight is fit for them, at least one; returns what came of
-  /// them.
-  std::vector<CellResult> fly(std::deque<Cell>& queue);
+  /// them. `before` of `total` cells were tried in other flights: for the progress.
+  std::vector<CellResult> fly(std::deque<Cell>& queue, std::size_t before, std::size_t total);
 
  private:
   struct Done {
@@ -39,7 +39,7 @@ class SharedFlight {
 
   const CampaignOptions& options_;
   FlightPlan plan_;
-  const std::function<bool()>& interrupted_;
+  const CampaignHooks& hooks_;
   FlightUnderTest flight_;
   std::vector<Done> done_;
 };

@@ -12,7 +12,7 @@ namespace wasp::faults {
 namespace {
 
 constexpr std::size_t kResendMemory = 200;  // setpoints; the sequence number runs through in 256 frames
-constexpr DurationNs kJoinWindow = kSecond;
+constexpr DurationNs kJoinWindow = 3 * kSecond;  // a line may hold a setpoint back
 
 class Checker {
  public:
@@ -100,10 +100,11 @@ class Checker {
     for (std::size_t i = 0; i < commands.size(); ++i) {
       const Setpoint& s = wire_.setpoints[i];
       if (s.at_ns < first_ns || s.at_ns > last_ns + limits_.period_ns / 2) continue;
-      if (commands[i] >= 0)
-        rests_on(s, evidence_.commands[static_cast<std::size_t>(commands[i])].exposed_at_ns);
-      else if (!within(evidence_.not_joined, s.at_ns))
+      if (within(evidence_.not_joined, s.at_ns)) continue;
+      if (commands[i] < 0)
         report(Offence::kNotOurs, s.at_ns, 0, &s);
+      else
+        rests_on(s, evidence_.commands[static_cast<std::size_t>(commands[i])].exposed_at_ns);
     }
   }
 

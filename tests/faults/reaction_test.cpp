@@ -38,32 +38,32 @@ TEST(Reaction, MeasuresDetectionResponseAndRecovery) {
   EXPECT_NEAR(*r.recovered_ms, 200, 1e-6);
   EXPECT_EQ(r.reason, ModeReason::kCueLost);
   EXPECT_FALSE(r.stream_ended);
-  EXPECT_FALSE(breach_of(kNeutral, Phase::kCruise, r, true));
+  EXPECT_FALSE(breach_of(kNeutral, kTrial, Phase::kCruise, r, true));
 }
 
 TEST(Reaction, ALateAnswerBreaksThePromiseByItsExcess) {
   const Reaction r = react(stream(300, 1200, 150, 1200).reader, kTrial);
-  const auto breach = breach_of(kNeutral, Phase::kCruise, r, true);
+  const auto breach = breach_of(kNeutral, kTrial, Phase::kCruise, r, true);
   ASSERT_TRUE(breach);
   EXPECT_NEAR(breach->excess_ms, 200, 1e-6);
-  EXPECT_FALSE(breach_of(kNeutral, Phase::kCruise, r, false)) << "times are not judged: it came";
+  EXPECT_FALSE(breach_of(kNeutral, kTrial, Phase::kCruise, r, false)) << "times are not judged: it came";
 }
 
 TEST(Reaction, NoAnswerAndNoAlarmBreakItWhateverTheHostDid) {
   const Reaction silent = react(stream(9999, 0, 9999, 9999).reader, kTrial);
   EXPECT_FALSE(silent.detected_ms);
-  const auto breach = breach_of(kNeutral, Phase::kCruise, silent, false);
+  const auto breach = breach_of(kNeutral, kTrial, Phase::kCruise, silent, false);
   ASSERT_TRUE(breach);
   EXPECT_TRUE(std::isinf(breach->excess_ms));
-  EXPECT_FALSE(breach_of(kNeutral, Phase::kIdle, silent, false)) << "on the ground no behaviour commands";
+  EXPECT_FALSE(breach_of(kNeutral, kTrial, Phase::kIdle, silent, false)) << "on the ground no behaviour commands";
   const Reaction stuck = react(stream(100, 9999, 150, 9999).reader, kTrial);
-  EXPECT_TRUE(breach_of(kNeutral, Phase::kCruise, stuck, true)) << "never recovered";
+  EXPECT_TRUE(breach_of(kNeutral, kTrial, Phase::kCruise, stuck, true)) << "never recovered";
 }
 
 TEST(Reaction, AnAlarmWithoutCauseBreaksThePromiseOfNone) {
   const Fault none{.id = "none", .promise = Promise::kUnaffected};
-  EXPECT_TRUE(breach_of(none, Phase::kHover, react(stream(100, 1200, 150, 1200).reader, kTrial), true));
-  EXPECT_FALSE(breach_of(none, Phase::kHover, react(stream(9999, 0, 9999, 9999).reader, kTrial), true));
+  EXPECT_TRUE(breach_of(none, kTrial, Phase::kHover, react(stream(100, 1200, 150, 1200).reader, kTrial), true));
+  EXPECT_FALSE(breach_of(none, kTrial, Phase::kHover, react(stream(9999, 0, 9999, 9999).reader, kTrial), true));
 }
 
 TEST(Reaction, AStreamThatEndsIsAStop) {
