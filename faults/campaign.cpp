@@ -97,6 +97,7 @@ class Campaign {
     plan.phase = g.phase, plan.seed = g.seed;
     plan.abilities = abilities_;
     plan.guarded = options_.guarded;
+    plan.replay = options_.replay;
     plan.weakened = options_.weakened;
     plan.recorder = std::ranges::any_of(g.cells, [](const Cell& c) { return c.fault->target == "recorder"; });
     plan.instance = next_name();

@@ -44,6 +44,7 @@ struct CampaignOptions {
   bool isolate = false;    ///< one flight each
   std::string weakened;    ///< negative control: TOML read after all others
   bool guarded = true;
+  std::filesystem::path replay = {};  ///< frames from this recording, hover only: where nothing can render
   std::filesystem::path out = "out/faults";
 };
 

@@ -13,8 +13,8 @@
 #include "faults/result_table.h"
 #include "faults/soak.h"
 #include "rt/clock.h"
+#include "shm/bus_guard.h"
 #include "tools/progress_line.h"
-#include "tools/record_bus_guard.h"
 
 namespace wasp::faults {
 namespace {
@@ -58,6 +58,9 @@ void declare(CLI::App& app, Options& o) {
       ->check(CLI::Range(120.0, 86400.0));
   app.add_flag("--no-guardian", o.no_guardian, "fly without it");
   app.add_flag("--no-rt", o.no_rt, "fly without real time");
+  app.add_option("--replay", o.campaign.replay,
+                 "fly on this recording instead of the simulated camera, in hover only: where nothing can render")
+      ->check(CLI::ExistingDirectory);
   app.add_flag("--own-machine", o.own_machine, "this machine is nobody else's: its clock may be changed");
   app.add_option("--out", o.campaign.out, "folder for the flights' files");
   app.add_option("--json", o.json, "write all results to this file");
@@ -72,6 +75,7 @@ std::string remaining(TimeNs began_ns, std::size_t done, std::size_t of) {
 int fly(const Options& o) {
   Abilities abilities = find_abilities();
   abilities.own_machine = o.own_machine;
+  abilities.replay = !o.campaign.replay.empty();
   if (o.no_rt) abilities.real_time = false;
   if (!abilities.real_time) std::cout << "NOT REAL TIME: no time of this run says anything of a flight that is\n";
   CampaignOptions campaign = o.campaign;
@@ -118,6 +122,7 @@ int main(int argc, char** argv) {
     return app.exit(e) == 0 ? 0 : 2;
   }
   if (options.class_number > 0) options.campaign.class_number = options.class_number;
+  if (!options.campaign.replay.empty() && options.phase.empty()) options.phase = "hover";
   if (!options.phase.empty()) options.campaign.phase = kPhaseNames.at(options.phase);
   if (options.list) {
     std::cout << catalogue_list();
@@ -126,7 +131,7 @@ int main(int argc, char** argv) {
   struct sigaction action {};
   action.sa_handler = [](int) { stop_requested = true; };
   for (const int s : {SIGINT, SIGTERM, SIGHUP}) sigaction(s, &action, nullptr);
-  wasp::tools::install_bus_guard();
+  wasp::shm::install_bus_guard();
   try {
     return fly(options);
   } catch (const std::exception& e) {

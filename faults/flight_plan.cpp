@@ -80,6 +80,7 @@ std::string flight_text(const FlightPlan& plan) {
       "[run]\nenforce_real_time = false\nadmission = \"warn\"\nincident_dir = \"{}\"\n[autopilot]\n"
       "endpoint = \"serial:{}:921600\"\n",
       (folder / "incidents").string(), (folder / "tty").string());
+  if (!plan.replay.empty()) return text + "[camera]\ndriver = \"replay\"\n" + kHoverControl;
   text += kCamera;
   text += std::string("[mission]\npatience_s = 600.0\n") + mission(plan.phase);
   return text + (plan.phase == Phase::kCruise ? kCruise : kHoverControl);
@@ -175,6 +176,7 @@ std::vector<std::string> flight_arguments(const FlightPlan& plan) {
   if (!plan.weakened.empty()) a.insert(a.end(), {"--config", (plan.folder / "weakened.toml").string()});
   if (!plan.abilities.real_time) a.push_back("--no-rt");
   if (plan.abilities.fault_points) a.insert(a.end(), {"--fault-socket", fault_socket(plan)});
+  if (!plan.replay.empty()) a.insert(a.end(), {"--replay", plan.replay.string(), "--preload", "--seconds", "3000"});
   a.insert(a.end(), plan.flight_options.begin(), plan.flight_options.end());
   return a;
 }

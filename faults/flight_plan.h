@@ -17,6 +17,7 @@ struct Abilities {
   bool guardian = false;      ///< `wasp guard`
   bool renderer = false;      ///< `wasp-sim` can be a camera
   bool own_machine = false;   ///< nobody else needs this machine's clock
+  bool replay = false;        ///< frames come from a recording: no camera process to do anything to
 };
 /// Runs the programs beside this one.
 Abilities find_abilities();
@@ -29,7 +30,8 @@ struct FlightPlan {
   bool recorder = false;
   std::string weakened;  ///< TOML after all others: a negative control
   std::vector<std::string> flight_options = {};
-  std::filesystem::path folder;  ///< of this flight, its own
+  std::filesystem::path replay = {};  ///< a recording instead of the camera; hover only
+  std::filesystem::path folder;       ///< of this flight, its own
   std::string instance;
 };
 

@@ -96,8 +96,10 @@ FlightUnderTest::FlightUnderTest(const FlightPlan& plan) : plan_(plan) {
   wait_until_there(autopilot_line(plan_), *sim_);
   tap_ = std::make_unique<WireTap>(autopilot_line(plan_), flight_line(plan_));
   if (plan_.phase == Phase::kIdle) held_ = tap_->add({WireFaultKind::kNoCommand, Direction::kToAutopilot});
-  start_camera();
-  wait_until_there("/dev/shm/" + shm::camera_region(plan_.instance), *camera_);
+  if (plan_.replay.empty()) {
+    start_camera();
+    wait_until_there("/dev/shm/" + shm::camera_region(plan_.instance), *camera_);
+  }
   watch_ = std::make_unique<FlightWatch>(plan_.instance);
   if (plan_.recorder) start_recorder();
   reference_ = start_reference();

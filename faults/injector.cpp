@@ -280,12 +280,21 @@ Injected inject(const Fault& fault, FlightUnderTest& flight, std::uint32_t seed)
   }
 }
 
+/// Done to the camera, or between it and the behaviours.
+static bool needs_camera(const Fault& fault) {
+  const bool point =
+      fault.injector == Injector::kPoint &&
+      (fault.what.starts_with("camera.") || fault.what.starts_with("image.") || fault.what.starts_with("depth."));
+  return point || fault.target == "camera";
+}
+
 std::string missing_for(const Fault& fault, const Abilities& abilities) {
   const bool guardian = fault.promise == Promise::kGuardian || fault.target == "guardian";
   if (guardian && !abilities.guardian) return "this wasp has no guardian";
   if (fault.injector == Injector::kPoint && !abilities.fault_points) return "this wasp has no fault points";
   if (fault.injector == Injector::kStart) return {};
-  if (!abilities.renderer) return "no camera: built without the renderer";
+  if (abilities.replay && needs_camera(fault)) return "a replay has no camera process";
+  if (!abilities.renderer && !abilities.replay) return "no camera: built without the renderer (--replay does without)";
   if (fault.injector == Injector::kClock && !abilities.own_machine)
     return "changes the machine's clock: in the guest only";
   const bool scheduling = fault.injector == Injector::kSteal || fault.injector == Injector::kHog;
