@@ -1,7 +1,9 @@
 // wasp bench micro, control: one tick of the whole control path in flight, cue present; the same while it holds.
 #include <benchmark/benchmark.h>
 
+#include "benchmarks/micro_pairs.h"
 #include "control/control_step.h"
+#include "scheduling/control_loop.h"
 
 namespace wasp::bench {
 namespace {
@@ -34,27 +36,59 @@ control::ControlInput input_at(TimeNs now_ns, bool cue_present) {
   return in;
 }
 
-void control_tick(benchmark::State& state, bool cue_present) {
-  const control::ControlParams p = params();
-  control::ControlState s;
-  TimeNs now_ns = kSecond;
-  control::ControlInput first = input_at(now_ns, true);
-  first.autopilot.armed = first.autopilot.follows = false;
-  control::control_step(p, first, s);
-  for (int i = 0; i < 100; ++i) control::control_step(p, input_at(now_ns += 50 * kMillisecond, true), s);
-  control::ControlInput in = input_at(now_ns, cue_present);
-  for (auto _ : state) {
-    in.now_ns += 50 * kMillisecond;
-    in.attitude.exposed_at_ns = in.autopilot.heard_at_ns = in.now_ns;
-    for (std::size_t i = 0; i < 2; ++i) in.cues.cues[i].exposed_at_ns = in.now_ns - 40 * kMillisecond;
-    benchmark::DoNotOptimize(control::control_step(p, in, s));
+/// A vehicle in flight, one tick at a time.
+class Flight {
+ public:
+  explicit Flight(bool cue_present) {
+    TimeNs now_ns = kSecond;
+    control::ControlInput first = input_at(now_ns, true);
+    first.autopilot.armed = first.autopilot.follows = false;
+    control::control_step(params_, first, state_);
+    for (int i = 0; i < 100; ++i) control::control_step(params_, input_at(now_ns += 50 * kMillisecond, true), state_);
+    input_ = input_at(now_ns, cue_present);
   }
-}
+  void tick() {
+    input_.now_ns += 50 * kMillisecond;
+    input_.attitude.exposed_at_ns = input_.autopilot.heard_at_ns = input_.now_ns;
+    for (std::size_t i = 0; i < 2; ++i) input_.cues.cues[i].exposed_at_ns = input_.now_ns - 40 * kMillisecond;
+    benchmark::DoNotOptimize(control::control_step(params_, input_, state_));
+  }
 
-void control_step_in_flight(benchmark::State& state) { control_tick(state, true); }
-void control_step_without_cues(benchmark::State& state) { control_tick(state, false); }
+ private:
+  control::ControlParams params_ = params();
+  control::ControlState state_;
+  control::ControlInput input_;
+};
+
+void control_step_in_flight(benchmark::State& state) {
+  Flight flight(true);
+  for (auto _ : state) flight.tick();
+}
 BENCHMARK(control_step_in_flight);
+
+void control_step_without_cues(benchmark::State& state) {
+  Flight flight(false);
+  for (auto _ : state) flight.tick();
+}
 BENCHMARK(control_step_without_cues);
+
+/// The hook between a tick's arithmetic and its write, which only a flight with fault points has.
+void fault_points_off_control(benchmark::State& state) {
+  Flight flight(true);
+  scheduling::ControlHook hook;
+  in_pairs(
+      state,
+      [&] {
+        flight.tick();
+        benchmark::DoNotOptimize(hook);
+        if (hook.before_write != nullptr) hook.before_write(hook.context, 1);
+      },
+      [&] {
+        flight.tick();
+        benchmark::DoNotOptimize(hook);
+      });
+}
+BENCHMARK(fault_points_off_control);
 
 }  // namespace
 }  // namespace wasp::bench

@@ -3,17 +3,19 @@
 #include <benchmark/benchmark.h>
 #include <unistd.h>
 
-#include <algorithm>
+#include <array>
 #include <memory>
 #include <string>
 #include <vector>
 
-#include "control/control_step.h"
-#include "rt/clock.h"
+#include "benchmarks/micro_pairs.h"
+#include "drivers/autopilot_link.h"
+#include "messages/frame_encoder.h"
+#include "messages/mavlink_messages.h"
 #include "scheduling/behaviour_faults.h"
-#include "scheduling/control_loop.h"
 #include "scheduling/sample_faults.h"
 #include "shm/broadcast_ring.h"
+#include "shm/topics.h"
 
 namespace wasp::bench {
 namespace {
@@ -21,40 +23,6 @@ namespace {
 using scheduling::BehaviourFaults;
 using scheduling::FaultBoard;
 using scheduling::SampleFaults;
-
-constexpr int kBlock = 200;
-
-template <class Path>
-double block_ns(Path& path) {
-  const TimeNs begin_ns = rt::now();
-  for (int i = 0; i < kBlock; ++i) path();
-  return static_cast<double>(rt::now() - begin_ns) / kBlock;
-}
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
-  return values[values.size() / 2];
-}
-
-/// Either path in turn, the first of a pair alternately.
-template <class With, class Without>
-void in_pairs(benchmark::State& state, With&& with, Without&& without) {
-  std::vector<double> ratios, with_ns, without_ns;
-  bool with_first = false;
-  for (auto _ : state) {
-    with_first = !with_first;
-    double a = with_first ? block_ns(with) : 0;
-    const double b = block_ns(without);
-    if (!with_first) a = block_ns(with);
-    with_ns.push_back(a);
-    without_ns.push_back(b);
-    ratios.push_back(a / b);
-  }
-  state.counters["with_ns"] = median(with_ns);
-  state.counters["without_ns"] = median(without_ns);
-  state.counters["ratio"] = median(ratios);
-}
 
 /// The question alone: a branch on a null pointer.
 void fault_point_off(benchmark::State& state) {
@@ -87,27 +55,51 @@ void fault_point_on_board_off(benchmark::State& state) {
 }
 BENCHMARK(fault_point_on_board_off);
 
-/// An inertial sample on its way into its ring.
+/// What LinkLoop does with the samples of a frame; the others are not sent.
+class Sink {
+ public:
+  Sink(const shm::Region& region, bool with) : ring_(region, "ring"), with_(with) {}
+  void on_imu(const ImuSample& received) noexcept {
+    if (!with_) {
+      ring_.write(received, ++now_ns_);
+      return;
+    }
+    ImuSample sample = received;
+    if (faults_.pass(sample, ++now_ns_)) ring_.write(sample, now_ns_);
+  }
+  void on_attitude(const AttitudeSample&) noexcept {}
+  void on_heartbeat(const drivers::AutopilotStatus&) noexcept {}
+  void on_ack(std::uint16_t, std::uint8_t) noexcept {}
+  void on_statustext(std::uint8_t, std::string_view) noexcept {}
+  void reply(std::span<const std::uint8_t>) noexcept {}
+  SampleFaults& faults() { return faults_; }
+
+ private:
+  shm::RingWriter ring_;
+  SampleFaults faults_;
+  TimeNs now_ns_ = 1;
+  bool with_;
+};
+
+/// An inertial sample, from the serial line's bytes into its ring.
 void fault_points_off_sample(benchmark::State& state) {
   const std::string name = "wasp.bench." + std::to_string(getpid()) + ".faults";
   const auto region = shm::Region::create(
-      name, std::vector<shm::TopicSpec>{{"ring", "", shm::TopicKind::kRing, shm::kPage / 64, sizeof(ImuSample)}});
-  shm::RingWriter ring(region, "ring");
-  SampleFaults faults;
-  ImuSample received;
-  TimeNs now_ns = 1;
+      name, std::vector<shm::TopicSpec>{{"ring", "", shm::TopicKind::kRing, shm::kImuSlots, sizeof(ImuSample)}});
+  std::array<std::uint8_t, mavlink::kMaxFrame> wire;
+  mavlink::HighresImu imu;
+  imu.time_usec = 1;
+  imu.zacc = -9.81f;
+  mavlink::Encoder encoder(1, mavlink::mav_component::kCompIdAutopilot1);
+  const std::span<const std::uint8_t> bytes(wire.data(), encoder.encode(imu, wire));
+  drivers::AutopilotLink link;
+  Sink with(region, true), without(region, false);
+  const auto receive = [&](Sink& sink) {
+    benchmark::DoNotOptimize(sink.faults());
+    link.receive(bytes, kSecond, sink);
+  };
   in_pairs(
-      state,
-      [&] {
-        benchmark::DoNotOptimize(faults);
-        ImuSample sample = received;
-        if (!faults.pass(sample, ++now_ns)) return;
-        ring.write(sample, now_ns);
-      },
-      [&] {
-        benchmark::DoNotOptimize(faults);
-        ring.write(received, ++now_ns);
-      });
+      state, [&] { receive(with); }, [&] { receive(without); });
   shm::Region::remove(name);
 }
 BENCHMARK(fault_points_off_sample);
@@ -152,28 +144,6 @@ void fault_points_off_behaviour(benchmark::State& state) {
       });
 }
 BENCHMARK(fault_points_off_behaviour);
-
-/// A control tick's arithmetic, and the hook between it and the write.
-void fault_points_off_control(benchmark::State& state) {
-  control::ControlParams params;
-  params.arbiter.behaviour_count = 1;
-  control::ControlState control_state;
-  control::ControlInput input;
-  input.now_ns = kSecond;
-  scheduling::ControlHook hook;
-  in_pairs(
-      state,
-      [&] {
-        benchmark::DoNotOptimize(hook);
-        benchmark::DoNotOptimize(control::control_step(params, input, control_state));
-        if (hook.before_write != nullptr) hook.before_write(hook.context, 1);
-      },
-      [&] {
-        benchmark::DoNotOptimize(hook);
-        benchmark::DoNotOptimize(control::control_step(params, input, control_state));
-      });
-}
-BENCHMARK(fault_points_off_control);
 
 }  // namespace
 }  // namespace wasp::bench

@@ -170,6 +170,7 @@ class Flight {
     if (options_.faults.empty() && options_.fault_socket.empty()) return;
     FaultSetup setup{options_.faults, options_.fault_socket, {{}, replay_ == nullptr}};
     for (const auto& row : config_.behaviours) setup.scope.behaviours.push_back(row.enabled ? row.name : "");
+    setup.timeline_over = incarnation() > 0;
     faults_ = std::make_unique<FaultControl>(setup, log);
     control_.faults = &faults_->board();
     control_.status->faults_armed = 1;

@@ -1,6 +1,9 @@
 #include "scheduling/flight_options.h"
 
 #include <CLI/CLI.hpp>
+#include <cstdio>
+
+#include "scheduling/fault_order.h"
 
 namespace wasp::scheduling {
 
@@ -31,10 +34,16 @@ std::optional<int> parse_flight_options(int argc, char** argv, FlightOptions& o)
   app.add_flag("--guarded", o.guarded,
                "started by `wasp guard`: the serial line is inherited, and the control thread beats");
   app.add_flag("--check-rights", o.check_rights, "only say which rights real time lacks; exit code 3 if any");
+  bool list_faults = false;
+  app.add_flag("--list-faults", list_faults, "only print the fault points");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? 0 : 2;
+  }
+  if (list_faults) {
+    std::fputs(list_of_fault_points().c_str(), stdout);
+    return 0;
   }
   return std::nullopt;
 }

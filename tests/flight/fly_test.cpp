@@ -125,6 +125,9 @@ TEST(Fly, RecordsReportsAndItsReplayGivesTheSameCuesToTheBit) {
   const auto document = nlohmann::json::parse(read_text(run / "run.json"));
   EXPECT_FALSE(document["real_time"].get<bool>());
   EXPECT_FALSE(document["kernel"].get<std::string>().empty());
+  EXPECT_FALSE(document.contains("faults"));  // nobody asked for any
+  EXPECT_FALSE(nlohmann::json::parse(read_text(run / "log/stages.json"))["run"]["faults_armed"].get<bool>());
+  EXPECT_EQ(read_text(run / "log/flight.txt").find("FAULTS ARMED"), std::string::npos);
   std::istringstream lines(text);
   int objects = 0;
   for (std::string line; std::getline(lines, line);)
@@ -247,6 +250,36 @@ void expect_refusal(const std::string& command, const std::string& word) {
   EXPECT_NE(code, 0) << command << "\n" << text;
   EXPECT_LT(code, 128) << command << "\n" << text;
   EXPECT_NE(text.find(word), std::string::npos) << command << "\n" << text;
+}
+
+TEST(Fly, FaultsByTimelineAreSaidInLogRunAndReportAndLeaveNothingBehind) {
+  TemporaryFolder out;
+  const fs::path timeline = out.path / "t.toml";
+  std::ofstream(timeline) << "[[fault]]\nat_s = 0.5\nafter = \"flying\"\nwhat = \"image.noise\"\nfor_s = 0.5\n"
+                             "[[fault]]\nat_s = 0.5\nafter = \"flying\"\nwhat = \"imu.slow\"\nfor_s = 0.3\n";
+  const std::string name = fly_to_the_end(out, "faults", "--seconds 4 --faults " + timeline.string());
+  const fs::path run = out.path / name;
+  const std::string log = read_text(run / "log/flight.txt");
+  for (const char* words : {"FAULTS ARMED: timeline", "fault: image.noise on for 0.5 s", "fault: image.noise off",
+                            "fault: imu.slow on for 0.3 s, 10 Hz", "fault: imu.slow off"})
+    EXPECT_NE(log.find(words), std::string::npos) << words << "\n" << log;
+  EXPECT_NE(nlohmann::json::parse(read_text(run / "run.json"))["faults"].get<std::string>().find("t.toml"),
+            std::string::npos);
+  EXPECT_TRUE(nlohmann::json::parse(read_text(run / "log/stages.json"))["run"]["faults_armed"].get<bool>());
+  EXPECT_NE(read_text(run / "report.html").find("FAULTS ARMED"), std::string::npos);
+  EXPECT_FALSE(fs::exists(run / "faults.sock"));
+  EXPECT_TRUE(shm::Region::list(shm::relay_region(name)).empty());
+}
+
+TEST(FlyRefuses, FaultsThatCannotBe) {
+  TemporaryFolder out;
+  const fs::path timeline = out.path / "t.toml";
+  std::ofstream(timeline) << "[[fault]]\nat_s = 0.5\nwhat = \"image.noisy\"\nfor_s = 0.5\n";
+  expect_refusal(fly(out, unique("badfault"), "--seconds 2 --faults " + timeline.string()), "t.toml:1");
+  expect_refusal(fly(out, unique("nofile"), "--seconds 2 --faults /nowhere.toml"), "/nowhere.toml");
+  const fs::path deep = out.path / std::string(90, 'x');
+  expect_refusal(kWasp + " fly --no-rt --faults --out " + deep.string() + " --name " + unique("deep") + " 2>&1",
+                 "at most 107 bytes");
 }
 
 TEST(FlyRefuses, WhatCannotBeFlown) {

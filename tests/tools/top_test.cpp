@@ -60,6 +60,15 @@ TEST(Top, OnceTextSaysNotRealTimeAndUsesNoEscapes) {
   EXPECT_EQ(text.find('\x1b'), std::string::npos);
 }
 
+TEST(Top, SaysWhetherFaultsAreArmed) {
+  FakeFlight flight(test::unique_instance("faults"));
+  publish_history(flight);
+  const std::string command = "TERM=dumb " + top("--instance " + flight.instance + " --once");
+  EXPECT_EQ(test::run_shell(command).first.find("FAULTS ARMED"), std::string::npos);
+  flight.run->faults_armed = 1;
+  EXPECT_NE(test::run_shell(command).first.find("FAULTS ARMED"), std::string::npos);
+}
+
 TEST(Top, UnknownInstanceFails) {
   const auto [text, code] = test::run_shell(top("--instance " + test::unique_instance("absent") + " --once"));
   EXPECT_EQ(code, 1);
