@@ -160,6 +160,8 @@ void LinkLoop::on_heartbeat(const drivers::AutopilotStatus& status) WASP_REALTIM
 void LinkLoop::on_ack(std::uint16_t command, std::uint8_t result) WASP_REALTIME {
   using namespace mavlink;  // NOLINT: its enumerations
   if (result == mav_result::kAccepted || result == mav_result::kInProgress) return;
+  if (result == mav_result::kTemporarilyRejected)
+    return events_.say(received_at_ns_, "autopilot not yet ready for command ", static_cast<long>(command));
   const std::string_view what =
       command == mav_cmd::kComponentArmDisarm   ? "autopilot refuses to arm or disarm, MAV_RESULT "
       : command == mav_cmd::kDoSetMode          ? "autopilot refuses our mode, MAV_RESULT "

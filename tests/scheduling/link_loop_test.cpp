@@ -170,9 +170,12 @@ TEST_F(LinkLoopTest, ARefusalIsReportedByItsName) {
   say(ack);
   EXPECT_TRUE(soon([&] { return said("autopilot refuses to arm or disarm, MAV_RESULT 2") == 1; }));
   ack.command = mavlink::mav_cmd::kDoSetMode;
+  ack.result = mavlink::mav_result::kFailed;
+  say(ack);
+  EXPECT_TRUE(soon([&] { return said("autopilot refuses our mode, MAV_RESULT 4") == 1; }));
   ack.result = mavlink::mav_result::kTemporarilyRejected;
   say(ack);
-  EXPECT_TRUE(soon([&] { return said("autopilot refuses our mode, MAV_RESULT 1") == 1; }));
+  EXPECT_TRUE(soon([&] { return said("autopilot not yet ready for command 176") == 1; }));
   ack.result = mavlink::mav_result::kAccepted;
   say(ack);
   rest();
