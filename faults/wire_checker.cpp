@@ -11,7 +11,7 @@
 namespace wasp::faults {
 namespace {
 
-constexpr std::size_t kResendMemory = 200;  // setpoints; the sequence number runs through in 256 frames
+constexpr std::size_t kResendMemory = 200;       // setpoints; the sequence number runs through in 256 frames
 constexpr DurationNs kJoinWindow = 3 * kSecond;  // a line may hold a setpoint back
 
 class Checker {
