@@ -13,8 +13,8 @@
 #include "faults/result_table.h"
 #include "faults/soak.h"
 #include "rt/clock.h"
+#include "shm/bus_guard.h"
 #include "tools/progress_line.h"
-#include "tools/record_bus_guard.h"
 
 namespace wasp::faults {
 namespace {
@@ -126,7 +126,7 @@ int main(int argc, char** argv) {
   struct sigaction action {};
   action.sa_handler = [](int) { stop_requested = true; };
   for (const int s : {SIGINT, SIGTERM, SIGHUP}) sigaction(s, &action, nullptr);
-  wasp::tools::install_bus_guard();
+  wasp::shm::install_bus_guard();
   try {
     return fly(options);
   } catch (const std::exception& e) {
