@@ -30,6 +30,7 @@ enum class Injector : std::uint8_t {
   kHog,         ///< a SCHED_FIFO thread of priority value spins on the core of control
   kLoad,        ///< stress-ng `what`, bounded
   kRegion,      ///< `what` happens to the shared memory file `target`
+  kDisk,        ///< the recorder writes to a disk of 256 KiB: full within a second
   kClock,       ///< CLOCK_REALTIME of the whole machine jumps by value s
   kStart,       ///< hostile input at start: `what`; no flight begins
 };

@@ -140,6 +140,17 @@ void FlightUnderTest::start_recorder() {
   recorder_.emplace(recorder_arguments(plan_), (plan_.folder / "recorder.txt").string());
 }
 
+void FlightUnderTest::start_recorder_on_small_disk() {
+  const fs::path disk = plan_.folder / "disk";
+  fs::create_directories(disk);
+  const std::string script =
+      fmt::format("mount -t tmpfs -o size=256k tmpfs '{0}' && exec {1} --instance {2} --out '{0}'", disk.string(),
+                  recorder_arguments(plan_).front(), plan_.instance);
+  recorder_.reset();
+  recorder_.emplace(std::vector<std::string>{"/usr/bin/unshare", "-m", "/bin/sh", "-c", script},
+                    (plan_.folder / "recorder.txt").string());
+}
+
 bool FlightUnderTest::running() { return flight_ && !flight_->poll(); }
 
 bool FlightUnderTest::wait_for(Phase phase, double patience_s) {

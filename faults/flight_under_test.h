@@ -52,6 +52,8 @@ class FlightUnderTest {
   /// Starts the camera (again).
   void start_camera();
   void start_recorder();
+  /// The recorder, on a disk of 256 KiB that only it sees.
+  void start_recorder_on_small_disk();
   /// One request over the fault socket; its answer.
   std::string ask_flight(const std::string& request);
 

@@ -269,6 +269,11 @@ Injected inject(const Fault& fault, FlightUnderTest& flight, std::uint32_t seed)
         return load(fault, flight);
       case Injector::kRegion:
         return tamper_region(fault, flight, seed);
+      case Injector::kDisk: {
+        const TimeNs at_ns = rt::now();
+        flight.start_recorder_on_small_disk();
+        return {at_ns, {}, {}};
+      }
       case Injector::kClock:
         return jump_wall_clock(fault);
       case Injector::kStart:

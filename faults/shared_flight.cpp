@@ -219,10 +219,15 @@ CellResult SharedFlight::judge(const Done& d, const WireLimits& limits, const st
     blame_for_good("the flight process died and was started again");
   if (d.crashed && fault.id != "guardian-killed") blame_for_good("crashed: " + d.outcome);
   if (!fault.says.empty() && answers_in(fault, d.cell.phase)) {
-    const bool said = std::ranges::any_of(log, [&](const LogLine& l) {
-      return l.at_ns >= d.trial.began_ns - kSecond && l.text.find(fault.says) != std::string::npos;
+    const auto said = std::ranges::find_if(log, [&](const LogLine& l) {
+      return l.at_ns >= d.trial.began_ns - 5 * kMillisecond && l.text.find(fault.says) != std::string::npos;
     });
-    if (!said) blame_for_good(fmt::format("nobody says '{}'", fault.says));
+    if (said == log.end()) return blame_for_good(fmt::format("nobody says '{}'", fault.says)), r;
+    const double after_ms = to_seconds(said->at_ns - d.trial.began_ns) * 1e3;
+    if (!r.reaction.detected_ms) r.reaction.detected_ms = std::max(0.0, after_ms);
+    if (options_.times && fault.promise == Promise::kBounded && fault.detected_ms > 0 && after_ms > fault.detected_ms)
+      blame(fmt::format("said after {:.0f} ms, promised {:.0f}", after_ms, fault.detected_ms),
+            after_ms - fault.detected_ms, {d.trial.began_ns, said->at_ns});
   }
   return r;
 }

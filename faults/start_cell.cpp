@@ -12,8 +12,10 @@
 #include "rt/clock.h"
 #include "shm/region.h"
 #include "shm/topics.h"
+#include "sim/pty.h"
 #include "tools/child_process.h"
 #include "tools/program_paths.h"
+#include "types/messages.h"
 
 namespace wasp::faults {
 namespace {
@@ -22,13 +24,13 @@ namespace fs = std::filesystem;
 
 constexpr double kPatience_s = 60;
 
-/// The file `bad` holds `content`; the shell runs `command` with $wasp, $bad, $dir and $name.
+/// The file `bad` holds `content`; the shell runs `command` with $wasp, $bad, $dir and $name. $good is a configuration
+/// with a serial line, and a camera offers its streams, so that nothing else is missing.
 struct StartRow {
   std::string_view what, content, command;
 };
 
 constexpr const char* kFlight = "$wasp flight --no-rt --instance $name --config $bad";
-constexpr const char* kGoodLine = "[autopilot]\nendpoint = \"serial:/dev/null:115200\"\n";
 
 constexpr std::array kRows = {
     StartRow{"unknown key", "[control]\nrate_hx = 20.0\n", kFlight},
@@ -42,31 +44,32 @@ constexpr std::array kRows = {
     StartRow{"no such file", "", "$wasp flight --no-rt --instance $name --config $dir/absent.toml"},
     StartRow{"no serial line", "[autopilot]\nendpoint = \"serial:/dev/absent:921600\"\n", kFlight},
     StartRow{"no baud rate", "[autopilot]\nendpoint = \"serial:/dev/ttyS0:12345\"\n", kFlight},
-    StartRow{"no recording", "", "$wasp flight --no-rt --instance $name --replay $dir/absent"},
-    StartRow{"empty recording", "", "mkdir $dir/rec; $wasp flight --no-rt --instance $name --replay $dir/rec"},
+    StartRow{"no recording", "", "$wasp flight --no-rt --instance $name-r --config $good --replay $dir/absent"},
+    StartRow{"empty recording", "",
+             "mkdir $dir/rec; $wasp flight --no-rt --instance $name-r --config $good --replay $dir/rec"},
     StartRow{"broken recording", "1.0 depth/1.png\nnonsense\n",
-             "mkdir $dir/rec; cp $bad $dir/rec/depth.txt; $wasp flight --no-rt --instance $name --replay $dir/rec"},
+             "mkdir $dir/rec; cp $bad $dir/rec/depth.txt; "
+             "$wasp flight --no-rt --instance $name-r --config $good --replay $dir/rec"},
     StartRow{"broken world", "#VRML V2.0 utf8\nShape { geometry IndexedFaceSet { coord Coordinate { point [ 1 2",
              "$wasp sim --no-camera --instance $name --tty-link $dir/tty --seconds 1 --world $bad && "
              "$wasp sim --camera-only --instance $name --seconds 1 --world $bad"},
     StartRow{"broken sim config", "[vehicle]\nmass_kg = -3.0\n",
              "$wasp sim --no-camera --instance $name --tty-link $dir/tty --seconds 1 --config $bad"},
     StartRow{"broken timeline", "[[fault]]\nat_s = 1.0\nwhat = \"camera.levitate\"\nfor_s = 1.0\n",
-             "$wasp flight --no-rt --instance $name --faults $bad"},
+             "$wasp flight --no-rt --instance $name --config $good --faults $bad"},
     StartRow{"timeline key", "[[fault]]\nat_s = 1.0\nwhat = \"camera.freeze\"\nfor_s = 1.0\nwhom = 3\n",
-             "$wasp flight --no-rt --instance $name --faults $bad"},
-    StartRow{"second flight", kGoodLine, kFlight},
+             "$wasp flight --no-rt --instance $name --config $good --faults $bad"},
+    StartRow{"second flight", "", "$wasp flight --no-rt --instance $name --config $good"},
     StartRow{"memlock 8 MiB", "",
-             "setpriv --bounding-set=-all --inh-caps=-all sh -c 'ulimit -l 8192; exec $wasp flight --instance $name'"},
+             "setpriv --bounding-set=-all --inh-caps=-all sh -c 'ulimit -l 8192; exec $wasp flight --instance $name "
+             "--config $good'"},
     StartRow{"no priority", "",
-             "setpriv --bounding-set=-all --inh-caps=-all sh -c 'ulimit -r 0; exec $wasp flight --instance $name'"},
-    StartRow{
-        "shm full", "",
-        "unshare -m sh -c 'mount -t tmpfs -o size=64k tmpfs /dev/shm && exec $wasp flight --no-rt --instance $name'"},
-    StartRow{"no descriptors", "", "ulimit -n 4; exec $wasp flight --no-rt --instance $name"},
-    StartRow{"disk full", "",
-             "mkdir $dir/small; unshare -m sh -c 'mount -t tmpfs -o size=4k tmpfs $dir/small && exec $wasp record "
-             "--instance $name --out $dir/small/a/b/c/d'"},
+             "setpriv --bounding-set=-all --inh-caps=-all sh -c 'ulimit -r 0; exec $wasp flight --instance $name "
+             "--config $good'"},
+    StartRow{"shm full", "",
+             "unshare -m sh -c 'mount -t tmpfs -o size=64k tmpfs /dev/shm && exec $wasp flight --no-rt --instance "
+             "$name --config $good'"},
+    StartRow{"no descriptors", "", "ulimit -n 6; exec $wasp flight --no-rt --instance $name --config $good"},
 };
 
 const StartRow* find(std::string_view what) {
@@ -82,16 +85,34 @@ std::string read_all(const fs::path& path) {
   return text.str();
 }
 
-/// Somebody else already writes the flight's region.
-std::optional<shm::Region> occupy(std::string_view what, const std::string& instance) {
-  if (what != "second flight") return std::nullopt;
-  const shm::TopicSpec topic{shm::kCommand, "Command", shm::TopicKind::kRing, 4, 64};
-  return shm::Region::create(shm::flight_region(instance), {&topic, 1});
-}
+/// What a flight needs besides its files, and for some cells a flight that is there already.
+struct Surroundings {
+  Surroundings(std::string_view what, const fs::path& folder, const std::string& name)
+      : line((folder / "tty-good").string()), instance(name) {
+    std::ofstream(folder / "good.toml") << "[autopilot]\nendpoint = \"serial:" << fs::absolute(folder).string()
+                                        << "/tty-good:921600\"\n[guardian]\nrestarts = 0\n";
+    using shm::TopicKind;
+    const std::vector<shm::TopicSpec> streams{{shm::kGray, "Frame", TopicKind::kRing, 4, 4096},
+                                              {shm::kDepth, "Frame", TopicKind::kRing, 4, 4096}};
+    if (what != "broken world") camera = shm::Region::create(shm::camera_region(name), streams);
+    const std::vector<shm::TopicSpec> command{{shm::kCommand, "Command", TopicKind::kRing, 4, sizeof(Command)}};
+    if (what == "second flight") flight = shm::Region::create(shm::flight_region(name), command);
+  }
+  ~Surroundings() {
+    if (camera) shm::Region::remove(shm::camera_region(instance));
+    if (flight) shm::Region::remove(shm::flight_region(instance));
+  }
+  Surroundings(const Surroundings&) = delete;
+  Surroundings& operator=(const Surroundings&) = delete;
+
+  sim::Pty line;
+  std::string instance;
+  std::optional<shm::Region> camera, flight;
+};
 
 std::string leftover(const std::string& instance) {
   for (const auto& entry : fs::directory_iterator("/dev/shm"))
-    if (entry.path().filename().string().starts_with("wasp." + instance + ".")) return entry.path().string();
+    if (entry.path().filename().string().starts_with("wasp." + instance)) return entry.path().string();
   return {};
 }
 
@@ -103,19 +124,18 @@ StartResult try_start(const Fault& fault, const fs::path& folder, const std::str
   fs::create_directories(folder);
   std::ofstream(folder / "bad", std::ios::binary) << row->content;
   const std::string log = (folder / "output.txt").string();
-  std::string script =
-      fmt::format("wasp={} bad={} dir={} name={}; export wasp bad dir name; {}", tools::program("wasp"),
-                  (folder / "bad").string(), fs::absolute(folder).string(), instance, row->command);
+  const std::string script =
+      fmt::format("wasp={}; dir={}; name={}; bad=$dir/bad; good=$dir/good.toml; export wasp dir name bad good; {}",
+                  tools::program("wasp"), fs::absolute(folder).string(), instance, row->command);
   StartResult result;
   {
-    const auto other = occupy(fault.what, instance);
+    const Surroundings surroundings(fault.what, folder, instance);
     tools::ChildProcess child({"/bin/sh", "-c", script}, log);
     const TimeNs deadline_ns = rt::now() + from_seconds(kPatience_s);
     while (!child.poll() && rt::now() < deadline_ns) rt::sleep_until(rt::now() + 5 * kMillisecond);
     if (!child.poll()) result.wrong = "it did not end";
     result.exit_code = child.end(SIGTERM, 5);
   }
-  if (fault.what == "second flight") shm::Region::remove(shm::flight_region(instance));
   result.output = read_all(log);
   if (!result.wrong.empty()) return result;
   if (result.exit_code == 0) result.wrong = "exit code 0";
