@@ -1,5 +1,5 @@
 # What the guest can be asked to do; sourced by init.sh. A line of /wasp/jobs is: flight NAME SECONDS rt|other idle|stress
-# or: rights NAME.
+# or: rights NAME, or: faults NAME REGEX.
 
 say() { echo "@wasp $*"; }
 
@@ -9,6 +9,7 @@ run_job() {
   case $kind in
     flight) flight "$@" ;;
     rights) rights "$@" ;;
+    faults) faults "$@" ;;
     *) say "error no job '$kind'" ;;
   esac
 }
@@ -69,6 +70,22 @@ rights() {
   say "result $name 0 {\"root\":$root,\"user\":$user,\"user_rights_missing\":$named," \
     "\"user_flight\":$flight,\"user_flight_refusals\":$refusals}"
   rm -rf /dev/shm/* "$name".*
+}
+
+# Faults done for real, their answers measured on the wire; nobody else needs this machine's clock.
+faults() {
+  name=$1 only=$2
+  say "start $name"
+  cd /tmp
+  tick_of_life "$name" 5 &
+  ticker=$!
+  wasp-faults --replay /wasp/clip --own-machine --only "$only" --out "/tmp/$name" --json "$name.json" >"$name.log" 2>&1
+  code=$?
+  kill $ticker
+  wait
+  sed "s/^/@wasp log $name /" "$name.log"
+  say "result $name $code $(tr -d '\n' <"$name.json")"
+  rm -rf /dev/shm/* "$name" "$name".*
 }
 
 flight() {

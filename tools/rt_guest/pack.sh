@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # pack.sh ROOT BUILD CLIP CONFIG JOBS INITRD: packs an initial memory file system for one boot of the guest.
 #   ROOT    unpacked packages of the guest's architecture (fetch.sh)
-#   BUILD   folder with wasp, wasp-sim and wasp-top of that architecture
+#   BUILD   folder with wasp, wasp-guard, wasp-sim, wasp-top and wasp-faults of that architecture
 #   CLIP    recording to replay      CONFIG  folder of TOML files      JOBS  list of jobs (jobs.sh)
 # Libraries are found as the loader would: what a program names as needed, and what that needs in turn.
 set -euo pipefail
@@ -43,7 +43,7 @@ add_program() {
 
 add_program "$root/usr/bin/busybox" "$stage/bin/busybox"
 add_program "$root/usr/bin/stress-ng" "$stage/bin/stress-ng"
-for program in wasp wasp-sim wasp-top; do add_program "$build/$program" "$stage/wasp/bin/$program"; done
+for program in wasp wasp-guard wasp-sim wasp-top wasp-faults; do add_program "$build/$program" "$stage/wasp/bin/$program"; done
 cp -r "$clip" "$stage/wasp/clip"
 cp "$config"/*.toml "$stage/wasp/config/"
 cp "$jobs" "$stage/wasp/jobs"

@@ -3,11 +3,26 @@
 #include <cmath>
 
 namespace wasp::tools::rt_guest {
+namespace {
 
-int Job::seconds() const { return static_cast<int>(std::ceil(static_cast<double>(cycles) / kControlRate_hz)); }
+constexpr int kFault_s = 15;  // a flight and its landing, about
+/// A death, a freeze, a hanging thread, what stops coming, and the wall clock: what a promise in milliseconds is made
+/// of.
+constexpr const char* kFewFaults =
+    "^(flight-killed|flight-stopped|flight-segv|control-thread-stops|attitude-stop|line-silence|behaviour-endless|"
+    "wall-clock-year-ahead)$";
+constexpr int kFew = 8;
+
+}  // namespace
+
+int Job::seconds() const {
+  if (kind == JobKind::kFaults) return kFault_s * fault_count;
+  return static_cast<int>(std::ceil(static_cast<double>(cycles) / kControlRate_hz));
+}
 
 std::string Job::line() const {
   if (kind == JobKind::kRights) return "rights " + name;
+  if (kind == JobKind::kFaults) return "faults " + name + " " + faults;
   return "flight " + name + " " + std::to_string(seconds()) + (real_time ? " rt" : " other") +
          (stressed ? " stress" : " idle");
 }
@@ -22,6 +37,10 @@ Plan plan_boot(const std::string& arch, const Cycles& cycles) {
   Plan plan{.arch = arch, .jobs = {}, .bars = {}};
   plan.jobs.push_back({.name = "rights", .kind = JobKind::kRights});
   plan.jobs.push_back({.name = "quiet", .cycles = cycles.quiet});
+  plan.jobs.push_back({.name = "faults",
+                       .kind = JobKind::kFaults,
+                       .faults = cycles.all_faults ? "." : kFewFaults,
+                       .fault_count = cycles.all_faults ? 80 : kFew});
   if (arch != "arm64") return plan;
   plan.jobs.push_back({.name = "stressed", .cycles = cycles.stressed, .stressed = true});
   plan.jobs.push_back({.name = "not-real-time", .cycles = cycles.not_real_time, .real_time = false, .stressed = true});

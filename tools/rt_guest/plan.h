@@ -11,6 +11,7 @@ inline constexpr double kControlRate_hz = 20.0;  ///< of config/wasp.toml
 
 enum class JobKind {
   kFlight,  ///< frames replayed, autopilot simulated
+  kFaults,  ///< faults done to flights, answers judged from the wire (faults/)
   kRights,  ///< what root is granted, and what anybody else is refused by name
 };
 
@@ -20,6 +21,8 @@ struct Job {
   std::int64_t cycles = 0;  ///< control cycles a flight must reach
   bool real_time = true;    ///< false: the same binary with --no-rt, SCHED_OTHER
   bool stressed = false;    ///< beside stress-ng
+  std::string faults = {};  ///< which, a regular expression of their names
+  int fault_count = 0;      ///< how many that are
 
   /// Virtual time in flight.
   [[nodiscard]] int seconds() const;
@@ -43,6 +46,7 @@ struct Plan {
 /// How many control cycles each flight must reach.
 struct Cycles {
   std::int64_t quiet = 300, stressed = 200, not_real_time = 100;
+  bool all_faults = false;  ///< of the catalogue that a replay can be done; else eight
 };
 
 /// arm64: rights, the quiet flight, the stressed one, and the negative control: the same binary and load without real

@@ -76,7 +76,8 @@ fs::path build_flight(const Plan& plan, const fs::path& cache, const fs::path& w
             "-DWASP_ARM64_ROOT=" + (cache / "root").string(), "-DWASP_FLIGHT_ONLY=ON"},
            work / "configure.txt");
   must_run("building for " + plan.arch,
-           {cmake, "--build", build.string(), "-j", "2", "--target", "wasp", "wasp-sim", "wasp-top"},
+           {cmake, "--build", build.string(), "-j", "2", "--target", "wasp", "wasp-guard", "wasp-sim", "wasp-top",
+            "wasp-faults"},
            work / "build.txt");
   return build;
 }

@@ -89,6 +89,23 @@ void judge_rights(const std::string& name, const nlohmann::json& f, std::vector<
   out.push_back(at_least(name + ": refusals to arm", number("user_flight_refusals"), 1));
 }
 
+/// Every cell of the campaign that was not skipped kept its promise, and there were as many as were asked for.
+void judge_faults(const Job& job, const nlohmann::json& f, std::vector<Result>& out) {
+  std::int64_t tried = 0;
+  if (f.is_object() && f.contains("cells"))
+    for (const auto& cell : f["cells"]) {
+      const std::string verdict = cell.value("verdict", "");
+      if (verdict == "skipped") continue;
+      ++tried;
+      std::string name = job.name + ": " + cell.value("fault", "") + ", answered [ms]";
+      const auto ms = [&](const char* key) {
+        return cell.contains(key) && cell[key].is_number() ? cell[key].get<double>() : 0;
+      };
+      out.push_back({std::move(name), ms("response_ms"), "ms", "promise kept", verdict == "ok"});
+    }
+  out.push_back(at_least(job.name + ": faults done", tried, job.fault_count));
+}
+
 }  // namespace
 
 std::vector<Row> read_rows(const Plan& plan, const std::map<std::string, JobOutcome>& outcomes) {
@@ -108,6 +125,9 @@ std::vector<Result> judge(const Plan& plan, const std::map<std::string, JobOutco
     const auto it = outcomes.find(job.name);
     judge_rights(job.name, it == outcomes.end() ? nlohmann::json() : it->second.figures, results);
   }
+  for (const Job& job : plan.jobs)
+    if (job.kind == JobKind::kFaults)
+      judge_faults(job, outcomes.contains(job.name) ? outcomes.at(job.name).figures : nlohmann::json(), results);
   for (const Row& row : read_rows(plan, outcomes)) {
     results.push_back(yes(row.job.name + ": figures handed back", row.present));
     if (row.present) judge_flight(plan.bars, row, outcomes.at(row.job.name), results);
