@@ -300,8 +300,8 @@ TEST_F(CameraRelayTest, HeadersSayWhatTheirFaultsSay) {
   FrameSource source(relayed_, flight_, Stream::kGray);
   set(FaultPoint::kCameraTornHeader);
   show_gray(++n);
-  clear(FaultPoint::kCameraTornHeader);
   EXPECT_FALSE(source.wait(rt::now() + 60 * kSecond, true));  // not followed
+  clear(FaultPoint::kCameraTornHeader);
 }
 
 TEST_F(CameraRelayTest, StampsStickAndCountsWrapAndRestart) {
