@@ -5,9 +5,10 @@
  * and therefore sees them. Loads happen when they are made: the acquire order the reader asks for leaves only the
  * payload's words free, and these are read in either order.
  *
- * Checked: what a reader accepts is whole and is the message it asked for; what it passes over was overwritten; at
- * every death and at the end the newest published message is complete. Each BROKEN_ variant leaves one step out and must be found wanting
- * (tests/models/check_models.sh). */
+ * Checked: what a reader accepts is whole and is the message it asked for, also when it goes back over the history
+ * (RingReader::rewind) before or after a death; what it passes over was overwritten; at every death and at the end all
+ * messages that lie under no slot just begun are complete. Each BROKEN_ variant leaves one step out and must be found
+ * wanting (tests/models/check_models.sh). The bell is tests/models/bell.pml. */
 #ifndef SLOTS
 #define SLOTS 3
 #endif
@@ -16,6 +17,12 @@
 #endif
 #ifndef DEATHS
 #define DEATHS 2
+#endif
+#ifndef READERS
+#define READERS 1
+#endif
+#ifndef REWINDS
+#define REWINDS 0   /* of each reader */
 #endif
 #define BUFFER 6
 
@@ -87,15 +94,25 @@ end:
   fi
 #define FENCE epoch++
 
-#define NEWEST_IS_WHOLE                                                                                           \
-  assert(memory[PUBLISHED] == 0 || (memory[SEQ(memory[PUBLISHED])] == 2 * memory[PUBLISHED] &&                    \
-                                    memory[WORD(memory[PUBLISHED], 0)] == memory[WORD(memory[PUBLISHED], 1)] &&   \
-                                    memory[WORD(memory[PUBLISHED], 0)] / 4 == memory[PUBLISHED]))
+/* The newest SLOTS - 1 messages. */
+#define WHOLE(n) (memory[SEQ(n)] == 2 * (n) && memory[WORD(n, 0)] == memory[WORD(n, 1)] && memory[WORD(n, 0)] / 4 == (n))
+inline history_is_whole() {
+  n = memory[PUBLISHED];
+  do
+  :: n > 0 && n + SLOTS - 1 > memory[PUBLISHED] -> assert(WHOLE(n)); n--
+  :: else -> break
+  od;
+  n = 0
+}
 
 active proctype Writer() {
   byte n, life = 0, deaths = 0;
 start:
+#ifdef BROKEN_FORGETFUL_SUCCESSOR
+  n = 1;
+#else
   n = memory[PUBLISHED] + 1;
+#endif
   do
   :: n <= MESSAGES ->
 #ifndef BROKEN_NO_MARK
@@ -120,19 +137,30 @@ start:
      n++
   :: else -> break
   od;
-  atomic { waiting == 0 -> NEWEST_IS_WHOLE };
+  atomic { waiting == 0 -> history_is_whole() };
   goto done;
 dead:
-  atomic { waiting == 0 -> NEWEST_IS_WHOLE; life++; goto start };
+  atomic { waiting == 0 -> history_is_whole(); life++; goto start };
 done:
   skip
 }
 
 /* RingReader::next, then use of the words, then RingReader::intact. */
-active proctype Reader() {
+active [READERS] proctype Reader() {
   byte seen = 0, newest, n, first, second;
+#if REWINDS > 0
+  byte rewinds = 0;
+#endif
 end:
   do
+#if REWINDS > 0
+  :: atomic { rewinds < REWINDS && seen > 0 -> rewinds++; newest = memory[PUBLISHED];
+       if
+       :: newest >= SLOTS -> seen = newest - SLOTS + 1
+       :: else -> seen = 0
+       fi;
+       newest = 0 }
+#endif
   :: atomic { memory[PUBLISHED] > seen -> newest = memory[PUBLISHED] };
      n = seen + 1;
      if

@@ -2,12 +2,11 @@
 // ring, and at every system call of Region::create and at instructions between them, whether it makes the region, takes
 // it over, or puts another in its place. After each death whoever looks finds a valid region or a clear refusal, and a
 // successor goes on. WASP_STEPPING=n tries n times as many instructions within create (default 1).
-#include <sys/ptrace.h>
-
 #include <cstdlib>
 #include <random>
 
 #include "tests/shm/fixture.h"
+#include "tests/support/traced.h"
 
 namespace wasp::shm {
 namespace {
@@ -36,49 +35,6 @@ bool is_message(const Small& value, std::uint64_t n) {
     if (value[i] != n * 0x9E3779B97F4A7C15ull + i) return false;
   return true;
 }
-
-/// A child that runs `prepare`, stops, and runs `work` under the eyes of its parent.
-class Traced {
- public:
-  template <class Prepare, class Work>
-  Traced(Prepare&& prepare, Work&& work)
-      : pid_(test::start_child([&] {
-          auto kept = prepare();
-          if (ptrace(PTRACE_TRACEME, 0, nullptr, nullptr) != 0) return 1;
-          raise(SIGSTOP);
-          work(kept);
-          raise(SIGUSR1);
-          return 0;
-        })),
-        status_(test::wait_for(pid_)) {
-    if (permitted()) ptrace(PTRACE_SETOPTIONS, pid_, nullptr, PTRACE_O_TRACESYSGOOD);
-  }
-  Traced(const Traced&) = delete;
-  Traced& operator=(const Traced&) = delete;
-  /// SIGKILL, wherever it stands.
-  ~Traced() {
-    kill(pid_, SIGKILL);
-    while (!WIFSIGNALED(status_) && !WIFEXITED(status_)) status_ = test::wait_for(pid_);
-  }
-
-  [[nodiscard]] bool permitted() const { return WIFSTOPPED(status_); }
-  [[nodiscard]] bool finished() const { return !WIFSTOPPED(status_) || WSTOPSIG(status_) == SIGUSR1; }
-  void step_instructions(std::uint64_t n) {
-    for (std::uint64_t i = 0; i < n && !finished(); ++i) go(PTRACE_SINGLESTEP);
-  }
-  /// To the n-th entry into or return from the kernel.
-  void step_system_calls(std::uint64_t n) {
-    for (std::uint64_t i = 0; i < n && !finished(); ++i) go(PTRACE_SYSCALL);
-  }
-
- private:
-  void go(decltype(PTRACE_SINGLESTEP) how) {
-    ptrace(how, pid_, nullptr, nullptr);
-    status_ = test::wait_for(pid_);
-  }
-  pid_t pid_;
-  int status_;
-};
 
 class Stepping : public NamedRegion {
  protected:
@@ -120,11 +76,11 @@ TEST_F(Stepping, WriterKilledAfterEachInstructionOfMessagesThatLapTheRing) {
   for (bool finished = false; !finished; steps += kStride, ++deaths) {
     const std::uint64_t before = witness.newest();
     {
-      Traced writer([&] { return create(); },
-                    [](const Region& own) {
-                      RingWriter ring(own, "data");
-                      for (std::uint64_t i = 0; i < kMessages; ++i) publish_next(ring);
-                    });
+      test::Traced writer([&] { return create(); },
+                          [](const Region& own) {
+                            RingWriter ring(own, "data");
+                            for (std::uint64_t i = 0; i < kMessages; ++i) publish_next(ring);
+                          });
       if (!writer.permitted()) GTEST_SKIP() << "ptrace is not permitted here";
       writer.step_instructions(steps);
       finished = writer.finished();
@@ -165,7 +121,7 @@ class SteppingThroughCreate : public Stepping, public testing::WithParamInterfac
     prepare();
     bool finished = false;
     {
-      Traced writer([] { return 0; }, [&](int) { create(); });
+      test::Traced writer([] { return 0; }, [&](int) { create(); });
       if (!writer.permitted()) return permitted_ = false;
       writer.step_system_calls(system_calls);
       writer.step_instructions(instructions);
