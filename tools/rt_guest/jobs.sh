@@ -77,14 +77,12 @@ faults() {
   name=$1 only=$2
   say "start $name"
   cd /tmp
-  tick_of_life "$name" 5 &
-  ticker=$!
-  wasp-faults --replay /wasp/clip --own-machine --only "$only" --out "/tmp/$name" --json "$name.json" >"$name.log" 2>&1
-  code=$?
-  kill $ticker
-  wait
-  sed "s/^/@wasp log $name /" "$name.log"
-  say "result $name $code $(tr -d '\n' <"$name.json")"
+  {
+    wasp-faults --replay /wasp/clip --own-machine --only "$only" --out "/tmp/$name" --json "$name.json" 2>&1
+    echo $? >"$name.code"
+  } | while IFS= read -r line; do say "log $name $line"; done
+  for log in "$name"/*/flight.txt; do sed "s/^/@wasp log $name /" "$log"; done
+  say "result $name $(cat "$name.code") $(tr -d '\n' <"$name.json")"
   rm -rf /dev/shm/* "$name" "$name".*
 }
 
