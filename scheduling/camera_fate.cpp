@@ -20,7 +20,7 @@ void CameraFates::decide(Fate& fate, const FaultBoard& board, TimeNs now_ns) WAS
   for (unsigned i = 0; i <= static_cast<unsigned>(kDepthDrop); ++i)
     if (board.on(static_cast<FaultPoint>(i), now_ns)) fate.points |= std::uint64_t{1} << i;
   if (fate.points == 0) return;
-  const double since_passed = static_cast<double>(now_ns - passed_at_ns_);
+  const double since_passed = static_cast<double>(now_ns) - static_cast<double>(passed_at_ns_);
   fate.lost = (fate.has(kCameraDrop) && random_.chance(board.value(kCameraDrop))) ||
               (fate.has(kCameraSlow) && since_passed * static_cast<double>(board.value(kCameraSlow)) < kSecond);
   if (!fate.lost) passed_at_ns_ = now_ns;

@@ -38,7 +38,7 @@ class CameraFates {
   std::array<Fate, 8> kept_;  ///< as many as a ring has slots
   std::size_t next_ = 0;
   Fate last_;                       ///< decided before this one
-  TimeNs passed_at_ns_ = 0;         ///< the last exposure that was not lost
+  TimeNs passed_at_ns_ = kNever;    ///< the last exposure that was not lost
   TimeNs stuck_ns_ = 0;             ///< stamp of the first exposure of camera.stamp_stuck
   std::uint32_t counted_from_ = 0;  ///< true sequence at which a count of its own began
   FaultRandom random_;

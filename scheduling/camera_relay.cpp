@@ -122,17 +122,24 @@ void CameraRelay::take(Channel& channel, const shm::Sample& sample) WASP_REALTIM
   std::memcpy(&header, sample.data, sizeof header);
   if (!channel.in.intact(sample)) return channel.in.count_lost();
   const Fate& fate = (channel.down ? down_ : front_).of(header, board_, now_ns);
-  if (read_fails(fate, now_ns) || fate.lost) return;
-  if (channel.depth && fate.has(kDepthDrop) && random_.chance(board_->value(kDepthDrop))) return;
+  if (comes_through(channel, fate, now_ns)) pass_on(channel, sample, fate, now_ns);
+  const TimeNs done_ns = rt::now();
+  relay_->record(done_ns - sample.published_at_ns);
+  watch_.trace.record(done_ns, rt::TraceKind::kFrame, header.sequence, done_ns - now_ns);
+}
+
+bool CameraRelay::comes_through(const Channel& channel, const Fate& fate, TimeNs now_ns) WASP_REALTIME {
+  if (read_fails(fate, now_ns) || fate.lost) return false;
+  return !(channel.depth && fate.has(kDepthDrop) && random_.chance(board_->value(kDepthDrop)));
+}
+
+void CameraRelay::pass_on(Channel& channel, const shm::Sample& sample, const Fate& fate, TimeNs now_ns) WASP_REALTIME {
   const bool in_line =
       fate.held || fate.has(kCameraLate) || fate.has(kCameraDuplicate) || waiting_ > 0 || channel.held != kFramesKept;
   if (in_line)
     keep(channel, sample, fate, now_ns);
   else
     forward(channel, sample, fate);
-  const TimeNs done_ns = rt::now();
-  relay_->record(done_ns - sample.published_at_ns);
-  watch_.trace.record(done_ns, rt::TraceKind::kFrame, header.sequence, done_ns - now_ns);
 }
 
 /// A camera that is not there: nothing comes of it. Says when it goes.

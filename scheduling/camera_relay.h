@@ -57,6 +57,8 @@ class CameraRelay {
   [[nodiscard]] bool unread() const WASP_REALTIME;
   void take_all(Channel& channel) WASP_REALTIME;
   void take(Channel& channel, const shm::Sample& sample) WASP_REALTIME;
+  bool comes_through(const Channel& channel, const Fate& fate, TimeNs now_ns) WASP_REALTIME;
+  void pass_on(Channel& channel, const shm::Sample& sample, const Fate& fate, TimeNs now_ns) WASP_REALTIME;
   void change(Channel& channel, const shm::Sample& sample, const Fate& fate, std::byte* frame) WASP_REALTIME;
   bool read_fails(const Fate& fate, TimeNs now_ns) WASP_REALTIME;
   void forward(Channel& channel, const shm::Sample& sample, const Fate& fate) WASP_REALTIME;
@@ -79,7 +81,7 @@ class CameraRelay {
   FaultRandom random_;
   EventQueue& events_;
   ThreadWatch& watch_;
-  Stage* relay_;
+  Stage* relay_;  ///< published by the camera to dealt with here, also of frames that go no further
 };
 
 }  // namespace wasp::scheduling

@@ -98,6 +98,11 @@ class CameraRelayTest : public ::testing::Test {
     ASSERT_EQ(take_depth().header.sequence, n);
     ASSERT_EQ(take_gray().header.sequence, n);
   }
+  /// The relay has looked at so many frames since the start, whatever became of them.
+  void wait_until_dealt_with(std::uint64_t frames) {
+    const rt::Histogram& relayed = stage_table(flight_).stages[0].histogram;
+    for (int i = 0; i < 60'000 && relayed.count() < frames; ++i) rt::sleep_until(rt::now() + kMillisecond);
+  }
   bool said(const std::string& words) {
     for (int i = 0; i < 60'000; ++i) {
       Event e;
@@ -180,7 +185,7 @@ TEST_F(CameraRelayTest, DroppedExposuresComeInNoRing) {
     show_both(n);
     show_down(n);
   }
-  rt::sleep_until(rt::now() + 50 * kMillisecond);  // the relay has had its chance; the sentinel below is the proof
+  wait_until_dealt_with(9);
   clear(FaultPoint::kCameraDrop);
   pass_pair(4);
   show_down(4);
@@ -197,12 +202,12 @@ TEST_F(CameraRelayTest, ShareOfDropsAndDepthAlone) {
 }
 
 TEST_F(CameraRelayTest, NoMoreFramesThanTheSlowRate) {
-  set(FaultPoint::kCameraSlow, 0.1f);  // one in ten seconds
+  set(FaultPoint::kCameraSlow, 0.001f);  // one in a quarter of an hour
   show_both(1);
   EXPECT_EQ(take_depth().header.sequence, 1u);
   EXPECT_EQ(take_gray().header.sequence, 1u);
   for (std::uint32_t n = 2; n <= 4; ++n) show_both(n);
-  rt::sleep_until(rt::now() + 50 * kMillisecond);
+  wait_until_dealt_with(8);
   clear(FaultPoint::kCameraSlow);
   pass_pair(5);
 }
@@ -211,7 +216,7 @@ TEST_F(CameraRelayTest, ADisconnectedCameraIsSilentAndSaidToBeReopened) {
   set(FaultPoint::kCameraDisconnect);
   EXPECT_TRUE(said("camera disconnected"));
   show_both(1);
-  rt::sleep_until(rt::now() + 50 * kMillisecond);
+  wait_until_dealt_with(2);
   clear(FaultPoint::kCameraDisconnect);
   EXPECT_TRUE(said("camera reopened"));
   pass_pair(2);
@@ -247,14 +252,15 @@ TEST_F(CameraRelayTest, LateFramesKeepTheirOrderAndDepthItsPlace) {
 }
 
 TEST_F(CameraRelayTest, AStoreThatIsFullLosesFramesAndCountsThem) {
-  set(FaultPoint::kCameraLate, 400);
+  set(FaultPoint::kCameraLate, 600'000);
   for (std::uint32_t n = 1; n <= 40; ++n) {
     show_gray(n);
     rt::sleep_until(rt::now() + kMillisecond / 2);
   }
-  while (control_.status->frames_lost.load() == 0) rt::sleep_until(rt::now() + kMillisecond);
-  clear(FaultPoint::kCameraLate);
-  EXPECT_EQ(take_gray().header.sequence, 1u);
+  const auto& lost = control_.status->frames_lost;  // in the store, or already in the ring if the host stood still
+  for (int i = 0; i < 60'000 && lost.load() < 22; ++i) rt::sleep_until(rt::now() + kMillisecond);
+  EXPECT_GE(lost.load(), 22u);  // 18 of the 40 are kept at most
+  EXPECT_EQ(gray_out_.newest(), 0u);
 }
 
 TEST_F(CameraRelayTest, ReorderedExposuresChangePlacesInPairs) {
@@ -301,7 +307,7 @@ TEST_F(CameraRelayTest, HeadersSayWhatTheirFaultsSay) {
   set(FaultPoint::kCameraTornHeader);
   show_gray(++n);
   EXPECT_FALSE(source.wait(rt::now() + 60 * kSecond, true));  // not followed
-  clear(FaultPoint::kCameraTornHeader);
+  EXPECT_EQ(gray_out_.newest(), n);
 }
 
 TEST_F(CameraRelayTest, StampsStickAndCountsWrapAndRestart) {
