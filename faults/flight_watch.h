@@ -39,6 +39,8 @@ class FlightWatch {
   [[nodiscard]] std::vector<Stretch> commands_unseen() const;   ///< we looked too late: they were overwritten
   [[nodiscard]] std::vector<Stretch> exposures_unseen() const;  ///< likewise
   [[nodiscard]] std::vector<TimeNs> exposures() const;          ///< of the front camera, rising as published
+  /// No new frame for more than 80 ms: a camera that is late by itself, if nothing was done to it.
+  [[nodiscard]] std::vector<Stretch> camera_pauses() const;
   [[nodiscard]] FlightCounts counts() const;
   [[nodiscard]] Truth truth() const;
   /// Lets go of all regions and looks no more (before somebody cuts them short).
@@ -57,7 +59,8 @@ class FlightWatch {
   FlightCounts counts_;
   Truth truth_;
   TimeNs phase_since_ns_ = 0;
-  std::vector<Stretch> commands_unseen_, exposures_unseen_;
+  std::vector<Stretch> commands_unseen_, exposures_unseen_, camera_pauses_;
+  TimeNs frame_seen_at_ns_ = 0;
   std::uint64_t commands_lost_ = 0, exposures_lost_ = 0;
   std::atomic<bool> stop_{false};
   rt::Thread thread_;  // joined first

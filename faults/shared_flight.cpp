@@ -96,9 +96,14 @@ SharedFlight::Done SharedFlight::try_cell(const Cell& cell) {
   done.trial.ended_ns = rt::now();
   if (injected.undo) injected.undo();
   if (done.error.empty()) wait_for_answer(cell);
+  done.trial.watched_until_ns = rt::now();
+  if (!final(*cell.fault) && shares(plan_.phase)) {  // a busy host may take a while
+    const TimeNs until_ns = rt::now() + from_seconds(kSettle_s);
+    while (!flight_.commanded(plan_.phase) && flight_.running() && rt::now() < until_ns && !hooks_.interrupted())
+      rt::sleep_until(rt::now() + 10 * kMillisecond);
+  }
   done.outcome = outcome();
   done.crashed = flight_.exit_code().value_or(0) >= 126;
-  done.trial.watched_until_ns = rt::now();
   done.counts = flight_.watch().counts();
   return done;
 }
@@ -202,9 +207,16 @@ CellResult SharedFlight::judge(const Done& d, const WireLimits& limits, const st
     r.why = noise ? fmt::format("{} (the host stood still for {:.1f} ms)", why, late_ms) : why;
   };
   const auto blame_for_good = [&](const std::string& why) { blame(why, kNotExplained, {}); };
+  const auto blame_breach = [&](const Breach& breach) {
+    const TimeNs alarm_ns = d.trial.began_ns + from_seconds(r.reaction.detected_ms.value_or(0) * 1e-3);
+    const Stretch before{alarm_ns - 300 * kMillisecond, alarm_ns};
+    const bool camera_late = fault.promise == Promise::kUnaffected && r.reaction.detected_ms &&
+                             overlap_ns(flight_.watch().camera_pauses(), before) > 0;
+    if (!camera_late) return blame(breach.why, breach.excess_ms, breach.waited);
+    if (r.verdict == Verdict::kOk) r.verdict = Verdict::kHostNoise, r.why = "alarm: the camera's process was late";
+  };
   if (!d.error.empty()) blame_for_good(d.error);
-  if (const auto breach = breach_of(fault, d.trial, d.cell.phase, r.reaction, options_.times))
-    blame(breach->why, breach->excess_ms, breach->waited);
+  if (const auto breach = breach_of(fault, d.trial, d.cell.phase, r.reaction, options_.times)) blame_breach(*breach);
   for (const Violation& v : r.violations) {
     const std::string why = fmt::format("{} on the wire ({:.3g})", name_of(v.offence), v.value);
     const double excess = excess_ms(v, limits);

@@ -134,7 +134,8 @@ StartResult try_start(const Fault& fault, const fs::path& folder, const std::str
     const TimeNs deadline_ns = rt::now() + from_seconds(kPatience_s);
     while (!child.poll() && rt::now() < deadline_ns) rt::sleep_until(rt::now() + 5 * kMillisecond);
     if (!child.poll()) result.wrong = "it did not end";
-    result.exit_code = child.end(SIGTERM, 5);
+    if (!child.poll()) kill(-child.pid(), SIGKILL);  // the shell and all that it started: they are one group
+    result.exit_code = child.end(SIGKILL, 5);
   }
   result.output = read_all(log);
   if (!result.wrong.empty()) return result;

@@ -1,8 +1,10 @@
 // What went over the serial line, in order, with the time of each piece: as either side wrote it, before any fault.
 #pragma once
 
+#include <array>
+#include <atomic>
 #include <cstdint>
-#include <mutex>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -19,23 +21,28 @@ struct WireChunk {
   std::vector<std::uint8_t> bytes;
 };
 
-/// One writer; readers on other threads take copies.
+/// One writer, readers on any thread; nobody waits for anybody: the writer is a real-time thread, its readers are not.
 class WireLog {
  public:
-  void add(TimeNs at_ns, Direction direction, std::span<const std::uint8_t> bytes) {
-    const std::scoped_lock lock(mutex_);
-    chunks_.push_back({at_ns, direction, {bytes.begin(), bytes.end()}});
+  /// False, and nothing kept, when it is full: some hours of a flight.
+  bool add(TimeNs at_ns, Direction direction, std::span<const std::uint8_t> bytes) {
+    const std::size_t n = size_.load(std::memory_order_relaxed);
+    if (n >= kBlocks * kBlock) return false;
+    auto& block = blocks_[n / kBlock];
+    if (!block) block = std::make_unique<Block>();
+    (*block)[n % kBlock] = {at_ns, direction, {bytes.begin(), bytes.end()}};
+    size_.store(n + 1, std::memory_order_release);
+    return true;
   }
-  /// The chunks from number `first` on.
-  [[nodiscard]] std::vector<WireChunk> since(std::size_t first) const {
-    const std::scoped_lock lock(mutex_);
-    if (first >= chunks_.size()) return {};
-    return {chunks_.begin() + static_cast<std::ptrdiff_t>(first), chunks_.end()};
-  }
+  [[nodiscard]] std::size_t size() const { return size_.load(std::memory_order_acquire); }
+  /// Chunk `n` < size(); it never changes and never moves.
+  [[nodiscard]] const WireChunk& at(std::size_t n) const { return (*blocks_[n / kBlock])[n % kBlock]; }
 
  private:
-  mutable std::mutex mutex_;
-  std::vector<WireChunk> chunks_;
+  static constexpr std::size_t kBlock = 1024, kBlocks = 8192;
+  using Block = std::array<WireChunk, kBlock>;
+  std::atomic<std::size_t> size_{0};
+  std::vector<std::unique_ptr<Block>> blocks_ = std::vector<std::unique_ptr<Block>>(kBlocks);
 };
 
 }  // namespace wasp::faults

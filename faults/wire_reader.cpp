@@ -24,7 +24,7 @@ bool Setpoint::neutral() const {
 }
 
 void WireReader::follow(const WireLog& log) {
-  for (const WireChunk& chunk : log.since(taken_)) take(chunk), ++taken_;
+  for (const std::size_t end = log.size(); taken_ < end; ++taken_) take(log.at(taken_));
 }
 
 void WireReader::take(const WireChunk& chunk) {

@@ -5,12 +5,12 @@
 
 #include <atomic>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "drivers/serial_port.h"
+#include "faults/inheriting_mutex.h"
 #include "faults/stretch.h"
 #include "faults/wire_fault.h"
 #include "rt/thread.h"
@@ -52,7 +52,7 @@ class WireTap {
   std::string link_path_;
   drivers::SerialPort autopilot_;
   WireLog log_;
-  mutable std::mutex mutex_;  ///< all below
+  mutable InheritingMutex mutex_;  ///< all below
   std::unique_ptr<sim::Pty> flight_;
   std::vector<Stage> stages_;
   int next_number_ = 1;

@@ -41,6 +41,7 @@ sigset_t block_signals() {
   for (const int s : {SIGINT, SIGTERM, SIGHUP}) sigaddset(&set, s);
   pthread_sigmask(SIG_BLOCK, &set, nullptr);
   signal(SIGPIPE, SIG_IGN);
+  signal(SIGXFSZ, SIG_IGN);  // a full quota for files is an error of write, not the end
   return set;
 }
 

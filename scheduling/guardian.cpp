@@ -34,6 +34,7 @@ int open_signals() {
   for (const int s : {SIGINT, SIGTERM, SIGHUP, SIGQUIT}) sigaddset(&set, s);
   sigprocmask(SIG_BLOCK, &set, nullptr);
   signal(SIGPIPE, SIG_IGN);
+  signal(SIGXFSZ, SIG_IGN);  // a full quota for files is an error of write, not the end
   return signalfd(-1, &set, SFD_CLOEXEC | SFD_NONBLOCK);
 }
 
