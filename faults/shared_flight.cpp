@@ -66,6 +66,7 @@ std::vector<CellResult> SharedFlight::fly(std::deque<Cell>& queue, std::size_t b
     CellResult result{.cell = queue.front(), .verdict = Verdict::kMiss, .why = "the flight never came so far"};
     if (const auto log = flight_.log(); !log.empty()) result.why += ": " + log.back().text;
     result.folder = plan_.folder;
+    if (hooks_.interrupted()) result.verdict = Verdict::kSkipped, result.why = "interrupted";
     queue.pop_front();
     return {result};
   }
@@ -103,6 +104,7 @@ SharedFlight::Done SharedFlight::try_cell(const Cell& cell) {
       rt::sleep_until(rt::now() + 10 * kMillisecond);
   }
   done.outcome = outcome();
+  done.interrupted = hooks_.interrupted();
   done.crashed = flight_.exit_code().value_or(0) >= 126;
   done.counts = flight_.watch().counts();
   return done;
@@ -178,6 +180,7 @@ CellResult SharedFlight::judge(const Done& d, const WireLimits& limits, const st
   const Fault& fault = *d.cell.fault;
   CellResult r{.cell = d.cell, .verdict = Verdict::kOk, .why = {}, .outcome = d.outcome};
   r.folder = plan_.folder;
+  if (d.interrupted) return r.verdict = Verdict::kSkipped, r.why = "interrupted", r;
   r.records_lost = flight_.records_lost();
   r.reaction = react(flight_.wire(), d.trial);
   std::vector<LogLine> log = flight_.log();

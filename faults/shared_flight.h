@@ -25,7 +25,7 @@ class SharedFlight {
     Trial trial = {};
     std::string error = {};  ///< it could not be done
     std::string outcome = {};
-    bool crashed = false;
+    bool crashed = false, interrupted = false;
     FlightCounts counts = {};
   };
   bool sleep_until(TimeNs until_ns);

@@ -78,6 +78,25 @@ for target in ("flight_config", "sim_config"):
     save(target, "odd_numbers", '[camera]\nwidth_px = 1e300\nheight_px = -nan\nfx_px = 0x7fffffffffffffff\ncx_px = inf\n')
     save(target, "odd_text", '[run]\n"a.b" = 1979-05-27T07:32:00Z\nx = """\n\\u00e9"""\ny = [1, [2.0], {z = true}]\n')
 
+# Faults; the first byte: even a live camera, odd a replay
+POINTS = re.findall(r'"([a-z]+\.[a-z_]+)"', open(os.path.join(HOUSE, "scheduling/fault_points.cpp"), encoding="utf-8").read())
+POINTS = sorted(set(POINTS))
+fault = '[[fault]]\nat_s = 5.0\nafter = "flying"\nwhat = "%s"\nfor_s = 0.5\n'
+save("fault_timeline", "every_point", "\0" + "".join(fault % point for point in POINTS))
+save("fault_timeline", "replay", "\1" + "".join(fault % point for point in POINTS[-3:]))
+save("fault_timeline", "value", "\0" + fault % POINTS[0] + 'value = 1e39\nbehaviour = "avoid"\n')
+save("fault_timeline", "odd", "\0fault = [1, {at_s = nan, what = 3}]\n")
+for point in POINTS:
+    save("fault_request", point, f"\0inject {point} for 0.5 value 1 behaviour avoid")
+for name, text in (("clear", "clear"), ("clear_one", f"clear {POINTS[0]}"), ("list", "list\n"), ("status", "status"),
+                   ("odd", "inject \x1b[31m for 1e999 value nan"), ("long", "inject " + "x" * 600)):
+    save("fault_request", name, "\0" + text)
+for target, words in (("fault_timeline", ["[[fault]]", "at_s = ", "after = ", "what = ", "for_s = ", "value = ", "behaviour = ", "start",
+                                          "armed", "flying", "landing"]),
+                      ("fault_request", ["inject ", "clear ", "list", "status", " for ", " value ", " behaviour ", "ground_altitude"])):
+    with open(os.path.join(HERE, target + ".dict"), "w", encoding="utf-8") as file:
+        file.write("# written by seeds.py\n" + "".join(f'"{word}"\n' for word in words + POINTS))
+
 # Images and recordings
 
 

@@ -24,12 +24,12 @@ struct Line {
     number.store(n, std::memory_order_release);
     bell.ring();
   }
-  /// Sleeps for each number up to `last`; gives up after a minute of silence.
+  /// Sleeps for each number up to `last`; gives up when it was the deadline that ended the sleep.
   void hear(std::uint64_t last) {
     for (std::uint64_t seen = 0; seen < last; heard = seen) {
-      if (!bell.wait([&]() noexcept { return number.load(std::memory_order_acquire) > seen; },
-                     rt::now() + 60 * kSecond))
-        return;
+      const TimeNs deadline = rt::now() + 60 * kSecond;
+      bell.wait([&]() noexcept { return number.load(std::memory_order_acquire) > seen; }, deadline);
+      if (rt::now() >= deadline) return;
       seen = number.load(std::memory_order_acquire);
     }
   }
