@@ -60,7 +60,7 @@ struct Fault {
   double detected_ms = 0;   ///< since the fault began; 0: not asked
   double response_ms = 0;   ///< likewise
   double recovered_ms = 0;  ///< since its end (the guardian's restart: since it began); 0: it does not
-  unsigned phases = kHover | kCruise;
+  unsigned phases = kAll;
   std::string_view says = {};   ///< reason in the heartbeat, or text in the log
   double tainted_after_ms = 0;  ///< frames exposed later than this must not be used; 0: they may
   bool isolated = false;        ///< the flight does not survive it: one for itself

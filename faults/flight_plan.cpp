@@ -34,18 +34,21 @@ constexpr const char* kCruise =
     "[behaviour.edge_altitude]\nenabled = false\n";
 constexpr const char* kHoverControl = "[behaviour.edge_altitude]\nenabled = false\n";
 
-/// Legs by phase: long enough for many faults, or short for one.
+/// Climbs and descents slow enough for several faults.
+constexpr const char* kSlowly = "[control]\nmax_climb_mps = 0.15\n";
+
+/// Legs by phase.
 const char* mission(Phase phase) {
   switch (phase) {
     case Phase::kIdle:
     case Phase::kHover:
       return "heights_m = [0.7]\nseconds = [3000.0]\n";
     case Phase::kTakeOff:
-      return "heights_m = [1.5]\nseconds = [8.0]\n";
+      return "heights_m = [2.5]\nseconds = [60.0]\n";
     case Phase::kCruise:
       return "heights_m = [1.0, 1.0]\nseconds = [4.0, 3000.0]\nforward_mps = [0.0, 0.3]\n";
     case Phase::kLanding:
-      return "heights_m = [1.0]\nseconds = [4.0]\n";
+      return "heights_m = [2.2]\nseconds = [15.0]\n";
   }
   return "";
 }
@@ -83,6 +86,7 @@ std::string flight_text(const FlightPlan& plan) {
   if (!plan.replay.empty()) return text + "[camera]\ndriver = \"replay\"\n" + kHoverControl;
   text += kCamera;
   text += std::string("[mission]\npatience_s = 600.0\n") + mission(plan.phase);
+  if (plan.phase == Phase::kTakeOff || plan.phase == Phase::kLanding) text += kSlowly;
   return text + (plan.phase == Phase::kCruise ? kCruise : kHoverControl);
 }
 

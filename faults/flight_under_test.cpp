@@ -28,6 +28,7 @@ constexpr DurationNs kReferencePeriod = kMillisecond;
 constexpr std::size_t kReferenceRoom = 900'000;  // 15 minutes
 constexpr int kReferencePriority = 90;
 constexpr int kControlCore = 1;
+constexpr float kTakenOff_m = 2.1f, kAlmostDown_m = 0.5f;
 
 std::string first_line(const fs::path& path) {
   std::ifstream file(path);
@@ -62,15 +63,23 @@ bool reached(Phase phase, const Command& c, DurationNs in_phase_ns) {
     case Phase::kIdle:
       return mission == MissionPhase::kArm && in_phase_ns > kSecond;
     case Phase::kTakeOff:
-      return in_leg(c, 0) && c.height_m > 0.35f;
+      return in_leg(c, 0) && c.height_m > 0.35f && c.height_m < kTakenOff_m;
     case Phase::kHover:
       return in_leg(c, 0) && in_phase_ns > 3 * kSecond && std::abs(c.height_m - c.height_setpoint_m) < 0.15f;
     case Phase::kCruise:
       return in_leg(c, 1) && in_phase_ns > 3 * kSecond && c.velocity_forward_mps > 0.15f;
     case Phase::kLanding:
-      return mission == MissionPhase::kLand && in_phase_ns > 200 * kMillisecond;
+      return mission == MissionPhase::kLand && in_phase_ns > 200 * kMillisecond && c.height_m > kAlmostDown_m;
   }
   return false;
+}
+
+bool passed(Phase phase, const Command& c) {
+  using control::MissionPhase;
+  const auto mission = static_cast<MissionPhase>(c.mission_phase);
+  if (phase == Phase::kTakeOff) return mission == MissionPhase::kLand || (in_leg(c, 0) && c.height_m >= kTakenOff_m);
+  if (phase != Phase::kLanding) return false;
+  return mission > MissionPhase::kLand || (mission == MissionPhase::kLand && c.height_m <= kAlmostDown_m);
 }
 
 }  // namespace
@@ -167,6 +176,8 @@ bool FlightUnderTest::commanded(Phase phase) {
   if (!running() || rt::now() - c.released_at_ns > 200 * kMillisecond) return false;
   return c.mode == (phase == Phase::kIdle ? FlightMode::kDisarmed : FlightMode::kBehaviour);
 }
+
+bool FlightUnderTest::past(Phase phase) { return passed(phase, watch_->newest()); }
 
 bool FlightUnderTest::settled(Phase phase) {
   return commanded(phase) && reached(phase, watch_->newest(), rt::now() - watch_->phase_since_ns());

@@ -35,6 +35,8 @@ class FlightUnderTest {
   bool wait_for(Phase phase, double patience_s);
   /// Commanded by behaviours (idle: on the ground, disarmed), now.
   [[nodiscard]] bool commanded(Phase phase);
+  /// True once the phase is over for good: high enough, or nearly down.
+  [[nodiscard]] bool past(Phase phase);
   /// Besides, where faults of the phase may begin.
   [[nodiscard]] bool settled(Phase phase);
   /// The flight process, or the guardian above it, still runs.

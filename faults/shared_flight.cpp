@@ -24,7 +24,8 @@ bool final(const Fault& fault) {
   return fault.isolated || fault.promise == Promise::kGuardian || fault.promise == Promise::kEnds;
 }
 
-bool shares(Phase phase) { return phase == Phase::kIdle || phase == Phase::kHover || phase == Phase::kCruise; }
+/// Phases that pass by themselves while faults are done: a flight in them may end.
+bool passes(Phase phase) { return phase == Phase::kTakeOff || phase == Phase::kLanding; }
 
 DurationNs reference_late_ns(const std::vector<tools::Wakeup>& reference, const Stretch& within) {
   DurationNs sum = 0;
@@ -77,12 +78,13 @@ std::vector<CellResult> SharedFlight::fly(std::deque<Cell>& queue, std::size_t b
     queue.pop_front();
     done_.push_back(try_cell(cell));
     hooks_.tried(before + done_.size(), total);
-    if (final(*cell.fault) || options_.isolate || !shares(plan_.phase)) break;
+    if (final(*cell.fault) || options_.isolate) break;
     const TimeNs patience_ns = rt::now() + from_seconds(kSettle_s);
-    while (!flight_.settled(plan_.phase) && flight_.running() && rt::now() < patience_ns && !hooks_.interrupted())
+    while (!flight_.settled(plan_.phase) && !flight_.past(plan_.phase) && flight_.running() &&
+           rt::now() < patience_ns && !hooks_.interrupted())
       rt::sleep_until(rt::now() + 10 * kMillisecond);
   } while (!queue.empty() && flight_.settled(plan_.phase) && !hooks_.interrupted());
-  flight_.end(shares(plan_.phase) ? 3 : 20);
+  flight_.end(plan_.phase == Phase::kLanding ? 25 : 3);  // a landing is watched to its end
   return judge();
 }
 
@@ -98,9 +100,10 @@ SharedFlight::Done SharedFlight::try_cell(const Cell& cell) {
   if (injected.undo) injected.undo();
   if (done.error.empty()) wait_for_answer(cell);
   done.trial.watched_until_ns = rt::now();
-  if (!final(*cell.fault) && shares(plan_.phase)) {  // a busy host may take a while
+  if (!final(*cell.fault)) {  // a busy host may take a while
     const TimeNs until_ns = rt::now() + from_seconds(kSettle_s);
-    while (!flight_.commanded(plan_.phase) && flight_.running() && rt::now() < until_ns && !hooks_.interrupted())
+    while (!flight_.commanded(plan_.phase) && !flight_.past(plan_.phase) && flight_.running() && rt::now() < until_ns &&
+           !hooks_.interrupted())
       rt::sleep_until(rt::now() + 10 * kMillisecond);
   }
   done.outcome = outcome();
@@ -113,12 +116,13 @@ SharedFlight::Done SharedFlight::try_cell(const Cell& cell) {
 /// Until the fault is recovered from and a little longer, or patience is over.
 void SharedFlight::wait_for_answer(const Cell& cell) {
   const Fault& fault = *cell.fault;
-  const double landing_s = final(fault) || !shares(plan_.phase) ? kLanding_s : 0;
+  const double landing_s = final(fault) ? kLanding_s : 0;
   const double patience_s = options_.times ? fault.recovered_ms * 1e-3 + kRecover_s + landing_s : kGenerous_s;
   const TimeNs until_ns = rt::now() + from_seconds(patience_s);
   const auto answered = [&] {
-    if (!shares(plan_.phase) || fault.promise == Promise::kEnds) return !flight_.running();
-    if (fault.promise != Promise::kGuardian) return flight_.commanded(plan_.phase);
+    if (fault.promise == Promise::kEnds) return !flight_.running();
+    if (fault.promise != Promise::kGuardian)
+      return flight_.commanded(plan_.phase) || (passes(plan_.phase) && flight_.past(plan_.phase));
     return cell.phase == Phase::kIdle ? flight_.watch().counts().incarnation > 0 : !flight_.running();
   };
   while (rt::now() < until_ns && flight_.running() && !hooks_.interrupted() && !answered())
@@ -228,7 +232,7 @@ CellResult SharedFlight::judge(const Done& d, const WireLimits& limits, const st
     else if (r.verdict == Verdict::kOk)
       r.verdict = Verdict::kHostNoise, r.why = why + fmt::format(", held by the line for {:.1f} ms", v.held_ms);
   }
-  const bool may_end = final(fault) || !shares(plan_.phase);
+  const bool may_end = final(fault) || passes(plan_.phase);
   if (!may_end && d.outcome != "goes on") blame_for_good("the flight did not go on: " + d.outcome);
   if (d.counts.incarnation > 0 && fault.promise != Promise::kGuardian)
     blame_for_good("the flight process died and was started again");

@@ -163,7 +163,7 @@ class Flight {
     camera_files_.name = camera_->name();
     replay_ = std::make_unique<ReplayCamera>(std::move(recording), *camera_, from_seconds(seconds), stages_,
                                              add_watch(config_.camera_thread), config_.camera_thread.overrun);
-    if (options_.preload) replay_->preload();
+    if (options_.preload && incarnation() == 0) replay_->preload();  // who only watches need not be early
   }
 
   /// Makes the fault points, if asked for: without an option there is no board, and no point can be thrown.
