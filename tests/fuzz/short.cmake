@@ -7,6 +7,7 @@ add_test(NAME fuzz.mavlink_mutants_accepted_are_collisions COMMAND mavlink_mutan
 set(runs_flight_config 4000)
 set(runs_sim_config 8000)
 set(runs_recording 8000)
+set(runs_fault_timeline 4000)
 find_program(WASP_CLANG NAMES clang++-22)
 file(GLOB corpora CONFIGURE_DEPENDS LIST_DIRECTORIES true RELATIVE ${CMAKE_CURRENT_LIST_DIR}/corpus ${CMAKE_CURRENT_LIST_DIR}/corpus/*)
 if(WASP_CLANG AND NOT WASP_SANITIZE)

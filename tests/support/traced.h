@@ -20,7 +20,8 @@ class Traced {
       : pid_(start_child([&] {
           auto kept = prepare();
           if (ptrace(PTRACE_TRACEME, 0, nullptr, nullptr) != 0) return 1;
-          raise(SIGSTOP);
+          raise(0);  // sends nothing, but is found: no step is the dynamic linker's
+          trap();
           work(kept);
           raise(SIGUSR1);
           return 0;
@@ -58,14 +59,15 @@ class Traced {
   void run_to_the_end() {
     while (!finished()) go(PTRACE_CONT);
   }
-  /// True if the next instruction enters the kernel, where a step may take for ever.
-  [[nodiscard]] bool at_system_call() const {
+  /// Number of the system call that the next instruction makes; -1: it makes none.
+  [[nodiscard]] long next_system_call() const {
 #if defined(__x86_64__)
     user_regs_struct registers{};
     ptrace(PTRACE_GETREGS, pid_, nullptr, &registers);
-    return (ptrace(PTRACE_PEEKTEXT, pid_, registers.rip, nullptr) & 0xFFFF) == 0x050F;
+    const bool enters = (ptrace(PTRACE_PEEKTEXT, pid_, registers.rip, nullptr) & 0xFFFF) == 0x050F;
+    return enters ? static_cast<long>(registers.rax) : -1;
 #else
-    return true;
+    return -1;
 #endif
   }
   /// To the n-th entry into or return from the kernel.
@@ -74,6 +76,14 @@ class Traced {
   }
 
  private:
+  /// Stops here and not in some library: the first step is the first of the work.
+  static void trap() {
+#if defined(__x86_64__)
+    asm volatile("int3");
+#else
+    raise(SIGTRAP);
+#endif
+  }
   void go(decltype(PTRACE_SINGLESTEP) how) {
     ptrace(how, pid_, nullptr, nullptr);
     status_ = wait_for(pid_);
