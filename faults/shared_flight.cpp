@@ -27,11 +27,16 @@ bool final(const Fault& fault) {
 /// Phases that pass by themselves while faults are done: a flight in them may end.
 bool passes(Phase phase) { return phase == Phase::kTakeOff || phase == Phase::kLanding; }
 
+/// How long the reference loop stood still. Of one standstill every wake-up that fell into it is late: it counts once.
 DurationNs reference_late_ns(const std::vector<tools::Wakeup>& reference, const Stretch& within) {
   DurationNs sum = 0;
-  for (const tools::Wakeup& w : reference)
-    if (w.due_at_ns + w.late_ns >= within.from_ns && w.due_at_ns <= within.until_ns && w.late_ns >= kOverrun)
-      sum += w.late_ns;
+  TimeNs counted_until_ns = kNever;
+  for (const tools::Wakeup& w : reference) {
+    const TimeNs ran_ns = w.due_at_ns + w.late_ns;
+    if (ran_ns < within.from_ns || w.due_at_ns > within.until_ns || w.late_ns < kOverrun) continue;
+    sum += std::max<DurationNs>(0, ran_ns - std::max(w.due_at_ns, counted_until_ns));
+    counted_until_ns = std::max(counted_until_ns, ran_ns);
+  }
   return sum;
 }
 

@@ -72,7 +72,7 @@ void WireTap::run() {
 }
 
 void WireTap::turn() {
-  std::array<pollfd, 2> fds{{{autopilot_.fd(), POLLIN, 0}, {-1, POLLIN, 0}}};
+  std::array<pollfd, 2> fds{{{autopilot_gone_ ? -1 : autopilot_.fd(), POLLIN, 0}, {-1, POLLIN, 0}}};
   {
     const std::scoped_lock lock(mutex_);
     if (flight_) fds[1].fd = flight_->fd();
@@ -85,10 +85,11 @@ void WireTap::turn() {
   if (now_ns - from_ns > kStall) stalls_.push_back({from_ns, now_ns});
   if ((fds[1].revents & POLLIN) != 0 && flight_)
     if (const auto bytes = flight_->read(); !bytes.empty()) pass(Direction::kToAutopilot, bytes, now_ns);
-  if ((fds[0].revents & POLLIN) != 0) {
+  if (fds[0].revents != 0) {
     std::array<std::uint8_t, 4096> buffer;
-    if (const auto got = autopilot_.read(buffer); got.bytes > 0)
-      pass(Direction::kToFlight, std::span(buffer).first(got.bytes), now_ns);
+    const auto got = autopilot_.read(buffer);
+    if (got.bytes > 0) pass(Direction::kToFlight, std::span(buffer).first(got.bytes), now_ns);
+    autopilot_gone_ = got.status == drivers::IoStatus::kGone;  // a dead line is always "ready": not asked again
   }
   if (!stages_.empty()) {
     pass(Direction::kToAutopilot, {}, now_ns);

@@ -57,6 +57,7 @@ class WireTap {
   std::vector<Stage> stages_;
   int next_number_ = 1;
   std::vector<Stretch> stalls_;
+  bool autopilot_gone_ = false;
   std::atomic<bool> stop_{false};
   rt::Thread thread_;  // joined first
 };

@@ -39,7 +39,7 @@ enum class AdmissionMode : std::uint8_t { kEnforce, kWarn, kOff };
 struct Config {
   bool enforce_real_time = true;
   bool strict_syscalls = false;
-  int heap_mib = 64;
+  int heap_mib = 16;
   AdmissionMode admission = AdmissionMode::kEnforce;
   DurationNs blocking_ns = 200 * kMicrosecond;  ///< longest the kernel keeps a ready real-time thread waiting
   int demote_after = 10;                        ///< steps over budget in a row; 0: never
