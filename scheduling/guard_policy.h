@@ -14,7 +14,7 @@ namespace wasp::scheduling {
 
 struct GuardTimes {
   DurationNs patience_ns = 20 * kMillisecond;     ///< after a release fell due
-  DurationNs kill_after_ns = 150 * kMillisecond;  ///< likewise
+  DurationNs kill_after_ns = 200 * kMillisecond;  ///< likewise
   DurationNs neutral_ns = 2 * kSecond;            ///< how long neutral is sent; 0: the stream stops at once
   DurationNs period_ns = 50 * kMillisecond;       ///< between two neutral setpoints
   DurationNs late_ns = 3 * kMillisecond;          ///< a look this much later than planned: the host held us up as well

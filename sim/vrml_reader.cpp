@@ -18,9 +18,15 @@
 #include <Inventor/errors/SoDebugError.h>
 #include <Inventor/errors/SoReadError.h>
 #include <Inventor/nodes/SoShape.h>
+#include <signal.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <bit>
+#include <cerrno>
 #include <cmath>
+#include <cstring>
 #include <map>
 #include <mutex>
 #include <stdexcept>
@@ -347,12 +353,7 @@ VrmlMotions motions_of(SoVRMLGroup& root, const fs::path& file) {
   }
 }
 
-}  // namespace
-
-Scene read_vrml(const fs::path& file) {
-  static std::mutex read_mutex;  // Coin and its error handlers are one for the process
-  const std::lock_guard lock(read_mutex);
-  SoDB::init();
+Scene read_here(const fs::path& file) {
   SoReadError::setHandlerCallback(note_error, nullptr);
   SoDebugError::setHandlerCallback([](const SoError*, void*) {}, nullptr);
   SoVRMLImageTexture::setDelayFetchURL(TRUE);  // pictures are read here, not by Coin
@@ -376,6 +377,41 @@ Scene read_vrml(const fs::path& file) {
   scene.world.sky = sky;
   if (smooth) scene.world.make_smooth();
   return scene;
+}
+
+/// Coin takes hostile files at their word and may crash on one: a child reads it first, and whatever becomes of that is
+/// an error of the file. Throws std::runtime_error naming it.
+void survive_in_a_child(const fs::path& file) {
+  constexpr rlim_t kSeconds = 60;
+  const pid_t child = fork();
+  if (child < 0) throw std::runtime_error(file.string() + ": cannot be tried in a child: " + std::strerror(errno));
+  if (child == 0) {
+    for (const int s : {SIGSEGV, SIGBUS, SIGABRT, SIGFPE, SIGILL}) signal(s, SIG_DFL);
+    const rlimit no_core{0, 0}, patience{kSeconds, kSeconds};
+    setrlimit(RLIMIT_CORE, &no_core);
+    setrlimit(RLIMIT_CPU, &patience);
+    try {
+      read_here(file);
+    } catch (const std::exception&) {  // told by the parent, which reads it again
+    }
+    _exit(0);
+  }
+  int status = 0;
+  while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
+  }
+  if (!WIFEXITED(status) || WEXITSTATUS(status) != 0)
+    throw std::runtime_error(file.string() + ": the VRML library fails on this file" +
+                             (WIFSIGNALED(status) ? std::string(": ") + strsignal(WTERMSIG(status)) : std::string()));
+}
+
+}  // namespace
+
+Scene read_vrml(const fs::path& file) {
+  static std::mutex read_mutex;  // Coin and its error handlers are one for the process
+  const std::lock_guard lock(read_mutex);
+  SoDB::init();
+  survive_in_a_child(file);
+  return read_here(file);
 }
 
 }  // namespace wasp::sim
