@@ -169,7 +169,9 @@ WireEvidence SharedFlight::evidence() const {
     if (f.promise == Promise::kGuardian || f.promise == Promise::kEnds)
       e.not_joined.push_back({d.trial.began_ns - 100 * kMillisecond, d.trial.watched_until_ns});
     if (f.tainted_after_ms > 0)
-      e.tainted.push_back({d.trial.began_ns + from_seconds(f.tainted_after_ms * 1e-3), d.trial.ended_ns});
+      // an exposure is relayed up to 60 ms later: those at the end meet a fault that is over
+      e.tainted.push_back(
+          {d.trial.began_ns + from_seconds(f.tainted_after_ms * 1e-3), d.trial.ended_ns - 60 * kMillisecond});
   }
   return e;
 }
