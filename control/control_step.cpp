@@ -279,7 +279,7 @@ ControlOutput control_step(const ControlParams& p, const ControlInput& in, Contr
   Command& c = out.command;
   put_setpoint(p, in, chosen, s, c);
   if (!standing) put_age_limits(p, in, intention, s.mode.mode, out);
-  c.exposed_at_ns = intention.oldest_exposed_at_ns;
+  c.exposed_at_ns = standing ? kNever : intention.oldest_exposed_at_ns;  // standing rests on nothing
   c.cue_source = intention.height_source;
   c.height_setpoint_m = wish.rotors ? s.altitude_hold.setpoint_m : 0.f;
   c.height_m = s.height.height_m;

@@ -86,6 +86,17 @@ TEST(ControlStep, ACommandSaysUntilWhenItMayGoOut) {
   EXPECT_EQ(refusal_at(cue_only, cue_until + 1), Refusal::kCueTooOld);
 }
 
+TEST(ControlStep, WhatIsSentWhileStandingRestsOnNoEvidence) {
+  const ControlParams p = params();
+  ControlState state = on_the_ground(p);
+  const ControlInput in = good_input(50 * kMillisecond);
+  const ControlOutput out = control_step(p, in, state);
+  EXPECT_EQ(out.command.sent, 1);
+  EXPECT_EQ(out.command.thrust, 0.f);
+  EXPECT_EQ(out.command.exposed_at_ns, kNever);
+  EXPECT_EQ(out.cue_until_ns, kForever);  // so no age of a cue can refuse it either
+}
+
 TEST(ControlStep, ARefusedCommandBecomesHoldOrFailsafeWithinTheLimits) {
   for (const Refusal refusal : {Refusal::kCueTooOld, Refusal::kAttitudeTooOld}) {
     ControlInput in;
