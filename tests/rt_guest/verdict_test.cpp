@@ -32,7 +32,12 @@ JobOutcome flown(std::uint64_t ticks, bool real_time, std::int64_t release_ns) {
 Outcomes good() {
   const nlohmann::json rights{
       {"root", 0}, {"user", 3}, {"user_rights_missing", 2}, {"user_flight", 1}, {"user_flight_refusals", 1}};
+  nlohmann::json faults{{"cells", nlohmann::json::array()}};
+  for (const char* fault : {"a", "b", "c", "d", "e", "f"})
+    faults["cells"].push_back({{"fault", fault}, {"verdict", "ok"}, {"response_ms", 66.7}});
+  faults["cells"].push_back({{"fault", "g"}, {"verdict", "skipped"}, {"response_ms", nullptr}});
   return {{"rights", {0, rights, {}}},
+          {"faults", {0, faults, {}}},
           {"quiet", flown(36'030, true, 39'000)},
           {"stressed", flown(2'430, true, 46'000)},
           {"not-real-time", flown(230, false, 14'000'000)}};
@@ -90,6 +95,12 @@ TEST(Verdict, EveryDoctoredFigureIsFoundByName) {
       {"figures that are no JSON",
        [](auto& o) { o.at("quiet").figures = nlohmann::json::parse("{\"sta", nullptr, false); },
        "quiet: figures handed back"},
+      {"a broken promise", [](auto& o) { o.at("faults").figures["cells"][2]["verdict"] = "MISS"; },
+       "faults: c, answered [ms]"},
+      {"noise where there is none", [](auto& o) { o.at("faults").figures["cells"][0]["verdict"] = "host noise"; },
+       "faults: a, answered [ms]"},
+      {"a fault that was not done", [](auto& o) { o.at("faults").figures["cells"].erase(5); }, "faults: faults done"},
+      {"a campaign that never came back", [](auto& o) { o.erase("faults"); }, "faults: faults done"},
       {"a user with root's rights", [](auto& o) { o.at("rights").figures["user"] = 0; }, "rights: a user's exit code"},
       {"root without rights", [](auto& o) { o.at("rights").figures["root"] = 3; }, "rights: root lacks none"},
   };
@@ -115,13 +126,14 @@ TEST(Verdict, TheTableShowsEveryFlight) {
 
 TEST(Plan, JobsAreLinesTheGuestUnderstands) {
   const Plan plan = full_plan();
-  ASSERT_EQ(plan.jobs.size(), 4u);
+  ASSERT_EQ(plan.jobs.size(), 5u);
   EXPECT_EQ(plan.jobs[0].line(), "rights rights");
   EXPECT_EQ(plan.jobs[1].line(), "flight quiet 1800 rt idle");
-  EXPECT_EQ(plan.jobs[2].line(), "flight stressed 120 rt stress");
-  EXPECT_EQ(plan.jobs[3].line(), "flight not-real-time 10 other stress");
-  EXPECT_EQ(plan.seconds(), 1930);
-  EXPECT_EQ(plan_boot("amd64", {}).jobs.size(), 2u);
+  EXPECT_EQ(plan.jobs[2].line().find("faults faults ^(flight-killed|"), 0u);
+  EXPECT_EQ(plan.jobs[3].line(), "flight stressed 120 rt stress");
+  EXPECT_EQ(plan.jobs[4].line(), "flight not-real-time 10 other stress");
+  EXPECT_EQ(plan.seconds(), 1930 + 6 * 15);
+  EXPECT_EQ(plan_boot("amd64", {}).jobs.size(), 3u);
 }
 
 }  // namespace

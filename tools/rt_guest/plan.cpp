@@ -7,9 +7,9 @@ namespace {
 
 constexpr int kFault_s = 15;  // a flight and its landing, about
 /// Deaths, a hanging thread, what stops coming, and the wall clock: what a promise in milliseconds is made of.
-constexpr const char* kFewFaults =
+constexpr const char* kFaults =
     "^(flight-killed|flight-segv|control-thread-stops|attitude-stop|line-silence|wall-clock-year-ahead)$";
-constexpr int kFew = 6;
+constexpr int kFaultCount = 6;
 
 }  // namespace
 
@@ -35,10 +35,7 @@ Plan plan_boot(const std::string& arch, const Cycles& cycles) {
   Plan plan{.arch = arch, .jobs = {}, .bars = {}};
   plan.jobs.push_back({.name = "rights", .kind = JobKind::kRights});
   plan.jobs.push_back({.name = "quiet", .cycles = cycles.quiet});
-  plan.jobs.push_back({.name = "faults",
-                       .kind = JobKind::kFaults,
-                       .faults = cycles.all_faults ? "." : kFewFaults,
-                       .fault_count = cycles.all_faults ? 80 : kFew});
+  plan.jobs.push_back({.name = "faults", .kind = JobKind::kFaults, .faults = kFaults, .fault_count = kFaultCount});
   if (arch != "arm64") return plan;
   plan.jobs.push_back({.name = "stressed", .cycles = cycles.stressed, .stressed = true});
   plan.jobs.push_back({.name = "not-real-time", .cycles = cycles.not_real_time, .real_time = false, .stressed = true});

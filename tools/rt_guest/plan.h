@@ -46,7 +46,6 @@ struct Plan {
 /// How many control cycles each flight must reach.
 struct Cycles {
   std::int64_t quiet = 300, stressed = 200, not_real_time = 100;
-  bool all_faults = false;  ///< of the catalogue that a replay can be done; else six
 };
 
 /// arm64: rights, the quiet flight, the stressed one, and the negative control: the same binary and load without real

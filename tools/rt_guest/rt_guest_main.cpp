@@ -32,7 +32,7 @@ struct Options {
 
 Plan plan_of(const Options& o) {
   Cycles cycles;
-  if (o.full) cycles = {.quiet = 36'000, .stressed = 2'400, .not_real_time = 200, .all_faults = true};
+  if (o.full) cycles = {.quiet = 36'000, .stressed = 2'400, .not_real_time = 200};
   if (o.cycles > 0) cycles.quiet = o.cycles;
   if (o.stress) cycles.stressed = cycles.quiet;
   if (o.stress_cycles > 0) cycles.stressed = o.stress_cycles;
