@@ -8,6 +8,7 @@ set(runs_flight_config 4000)
 set(runs_sim_config 8000)
 set(runs_recording 8000)
 set(runs_fault_timeline 4000)
+set(runs_vrml 2000)  # each world is first read by a child process
 find_program(WASP_CLANG NAMES clang++-22)
 file(GLOB corpora CONFIGURE_DEPENDS LIST_DIRECTORIES true RELATIVE ${CMAKE_CURRENT_LIST_DIR}/corpus ${CMAKE_CURRENT_LIST_DIR}/corpus/*)
 if(WASP_CLANG AND NOT WASP_SANITIZE)
