@@ -127,7 +127,7 @@ void SharedFlight::wait_for_answer(const Cell& cell) {
   const auto answered = [&] {
     if (fault.promise == Promise::kEnds) return !flight_.running();
     if (fault.promise != Promise::kGuardian)
-      return flight_.commanded(plan_.phase) || (passes(plan_.phase) && flight_.past(plan_.phase));
+      return flight_.commanded(plan_.phase) || (plan_.phase == Phase::kLanding && flight_.past(plan_.phase));
     return cell.phase == Phase::kIdle ? flight_.watch().counts().incarnation > 0 : !flight_.running();
   };
   while (rt::now() < until_ns && flight_.running() && !hooks_.interrupted() && !answered())
