@@ -423,7 +423,7 @@ TEST_P(FlightLost, TheGuardianSpeaksStartsItAgainAndItNeverCommands) {
   Program program({kWasp, "fly", "--no-rt", "--json", "--out", out.path.string(), "--name", name, "--seconds", "600"});
   const fs::path log = out.path / name / "log";
   ASSERT_TRUE(eventually([&] { return read_text(log / "commands.csv").find(",behaviour,") != std::string::npos; }));
-  run_shell(std::string("pkill -") + GetParam() + " -f -- 'wasp flight --instance " + name + " '");
+  run_shell(std::string("pkill -") + GetParam() + " -f -- '[w]asp flight --instance " + name + " '");
   EXPECT_NE(program.wait(), 0);
   const std::string said = read_text(log / "flight.txt");
   for (const char* line :
