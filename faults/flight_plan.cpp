@@ -90,6 +90,17 @@ std::string flight_text(const FlightPlan& plan) {
   return text + (plan.phase == Phase::kCruise ? kCruise : kHoverControl);
 }
 
+/// What vehicle and camera are both told: the same instance, world and seed.
+std::vector<std::string> simulator_arguments(const FlightPlan& plan) {
+  return {tools::program("wasp-sim"),
+          "--instance",
+          plan.instance,
+          "--config",
+          (plan.folder / "sim.toml").string(),
+          "--seed",
+          std::to_string(plan.seed)};
+}
+
 }  // namespace
 
 const char* name_of(Phase phase) {
@@ -142,27 +153,15 @@ std::string flight_line(const FlightPlan& plan) { return (plan.folder / "tty").s
 std::string fault_socket(const FlightPlan& plan) { return (plan.folder / "faults.sock").string(); }
 
 std::vector<std::string> sim_arguments(const FlightPlan& plan) {
-  return {tools::program("wasp-sim"),
-          "--instance",
-          plan.instance,
-          "--config",
-          (plan.folder / "sim.toml").string(),
-          "--seed",
-          std::to_string(plan.seed),
-          "--tty-link",
-          autopilot_line(plan),
-          "--no-camera"};
+  auto a = simulator_arguments(plan);
+  a.insert(a.end(), {"--tty-link", autopilot_line(plan), "--no-camera"});
+  return a;
 }
 
 std::vector<std::string> camera_arguments(const FlightPlan& plan) {
-  return {tools::program("wasp-sim"),
-          "--instance",
-          plan.instance,
-          "--config",
-          (plan.folder / "sim.toml").string(),
-          "--seed",
-          std::to_string(plan.seed),
-          "--camera-only"};
+  auto a = simulator_arguments(plan);
+  a.push_back("--camera-only");
+  return a;
 }
 
 std::vector<std::string> recorder_arguments(const FlightPlan& plan) {

@@ -8,21 +8,10 @@
 #include <utility>
 
 #include "scheduling/default_config.h"
+#include "scheduling/toml_durations.h"
 
 namespace wasp::scheduling {
 namespace {
-
-void read_milliseconds(TomlTable& t, const char* key, DurationNs& out) {
-  double ms = static_cast<double>(out) / kMillisecond;
-  t.number(key, ms, 1, 60'000);
-  out = static_cast<DurationNs>(ms * kMillisecond);
-}
-
-void read_microseconds(TomlTable& t, const char* key, DurationNs& out) {
-  double us = static_cast<double>(out) / kMicrosecond;
-  t.number(key, us, 1, 1'000'000);
-  out = static_cast<DurationNs>(us * kMicrosecond);
-}
 
 /// `value` as one of `names`, which are in the order of the enumeration.
 template <class Enum>

@@ -3,15 +3,10 @@
 #include <sstream>
 
 #include "scheduling/default_config.h"
+#include "scheduling/toml_durations.h"
 
 namespace wasp::scheduling {
 namespace {
-
-void read_milliseconds(TomlTable& t, const char* key, DurationNs& out, double low_ms, double high_ms) {
-  double ms = static_cast<double>(out) / kMillisecond;
-  t.number(key, ms, low_ms, high_ms);
-  out = static_cast<DurationNs>(ms * kMillisecond);
-}
 
 void read_plan(TomlTable root, GuardPlan& plan) {
   read_guardian(root.table("guardian"), plan.guard);
