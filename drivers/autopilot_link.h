@@ -84,16 +84,25 @@ class AutopilotLink {
   /// Takes bytes that arrived at `received_at_ns`. The sink has, all noexcept: on_imu(const ImuSample&),
   /// on_attitude(const AttitudeSample&), on_heartbeat(const AutopilotStatus&), on_ack(uint16_t command, uint8_t
   /// result), on_statustext(uint8_t severity, std::string_view), reply(std::span<const uint8_t>) for frames that must
-  /// go out. Sample times never lie after `received_at_ns`. Realtime-safe: yes if the sink is.
+  /// go out. It may have on_frame(const mavlink::Frame&), which is then given what nobody here handles (from whomever,
+  /// echoes of our own apart), commands included; without it every command addressed to us is refused. Sample times
+  /// never lie after `received_at_ns`. Realtime-safe: yes if the sink is.
   template <class Sink>
   void receive(std::span<const std::uint8_t> bytes, TimeNs received_at_ns, Sink& sink) WASP_REALTIME {
     parser_.feed(bytes, [&](const mavlink::Frame& frame) noexcept {
       if (is_from_autopilot(frame))
         dispatch(frame, received_at_ns, sink);
       else
-        refuse_command(frame, sink);
+        pass_on(frame, sink);
     });
   }
+
+  /// Any message as a frame of ours, in the one sequence of this link; 0 if `out` is too small.
+  template <class Message>
+  std::size_t encode(const Message& message, std::span<std::uint8_t> out) WASP_REALTIME {
+    return encoder_.encode(message, out);
+  }
+  [[nodiscard]] const LinkIdentity& identity() const noexcept { return identity_; }
 
   /// SET_ATTITUDE_TARGET with type mask 7, or 3 with a yaw rate. 0 if a number is not finite or `out` is too small.
   /// `now_ns` becomes the autopilot's time once the clocks are matched.
@@ -148,7 +157,16 @@ class AutopilotLink {
       case mavlink::Ping::kId:
         return ping(frame, sink);
       default:
-        return refuse_command(frame, sink);
+        return pass_on(frame, sink);
+    }
+  }
+
+  template <class Sink>
+  void pass_on(const mavlink::Frame& frame, Sink& sink) WASP_REALTIME {
+    if constexpr (requires { sink.on_frame(frame); }) {
+      if (frame.system_id != identity_.system_id || frame.component_id != identity_.component_id) sink.on_frame(frame);
+    } else {
+      refuse_command(frame, sink);
     }
   }
 
@@ -210,7 +228,7 @@ class AutopilotLink {
     send(m, sink);
   }
 
-  /// Every command addressed to us by name is answered; we support none.
+  /// Without a sink that serves commands every one addressed to us by name is refused.
   template <class Sink>
   void refuse_command(const mavlink::Frame& frame, Sink& sink) WASP_REALTIME {
     mavlink::CommandAck answer;
