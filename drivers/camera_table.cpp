@@ -1,0 +1,26 @@
+// The kinds of cameras this build has.
+#include <array>
+
+#include "drivers/camera_driver.h"
+#include "drivers/v4l2_camera.h"
+
+namespace wasp::drivers {
+
+std::span<const CameraDriverRow> camera_drivers() {
+  static constexpr std::array kRows{
+      CameraDriverRow{"v4l2", "cameras of the kernel's Video4Linux2, USB ones above all", false, make_v4l2_camera,
+                      list_v4l2_cameras},
+  };
+  return kRows;
+}
+
+const CameraDriverRow& camera_driver(const std::string& name) {
+  std::string known;
+  for (const auto& row : camera_drivers()) {
+    if (row.name == name) return row;
+    known += (known.empty() ? "" : ", ") + std::string(row.name);
+  }
+  throw std::runtime_error("this build has no camera driver '" + name + "'; it has: " + known);
+}
+
+}  // namespace wasp::drivers
