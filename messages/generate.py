@@ -1,203 +1,164 @@
 #!/usr/bin/env python3
-"""Writes the C++ message structs from a MAVLink definition file: generate.py wasp.xml mavlink_messages.h
+"""Writes the C++ message structs and the JSON description from a MAVLink definition file:
 
-Base fields are sorted by element size, largest first, equal sizes in file order; extensions follow unsorted. CRC_EXTRA
-is computed over the message name and the base fields in wire order. Any inconsistency in the file ends the build.
+    generate.py wasp.xml [--header mavlink_messages.h] [--json mavlink_messages.json] [--table-only telemetry.xml]
+
+Messages of a --table-only file have a row in the message table (so that frames are verified) and a place in the JSON
+(so that they are decoded), but no struct. A definition that cannot be used ends the build with a line that says why.
 """
+import argparse
+import json
+import os
 import sys
-import xml.etree.ElementTree as ElementTree
-from dataclasses import dataclass
 
-SIZES = {"uint64_t": 8, "int64_t": 8, "double": 8, "uint32_t": 4, "int32_t": 4, "float": 4,
-         "uint16_t": 2, "int16_t": 2, "uint8_t": 1, "int8_t": 1, "char": 1}
-MAX_PAYLOAD = 255
+from definition import Invalid, read_definition
 
-
-@dataclass
-class Field:
-    name: str
-    type: str       # element type
-    length: int     # 0: not an array
-    extension: bool
-    doc: str
-    offset: int = 0
-
-    @property
-    def bytes(self):
-        return SIZES[self.type] * max(1, self.length)
-
-    @property
-    def cpp_type(self):
-        element = self.type if self.type in ("float", "double", "char") else f"std::{self.type}"
-        return f"std::array<{element}, {self.length}>" if self.length else element
-
-
-@dataclass
-class Message:
-    id: int
-    name: str
-    doc: str
-    fields: list    # in wire order
-    crc_extra: int = 0
-
-    @property
-    def min_length(self):
-        return sum(f.bytes for f in self.fields if not f.extension)
-
-    @property
-    def max_length(self):
-        return sum(f.bytes for f in self.fields)
-
-    @property
-    def cpp_name(self):
-        return camel(self.name)
-
-
-def fail(text):
-    sys.exit(f"generate.py: {text}")
+KEYWORDS = set("""alignas alignof and asm auto bool break case catch char class concept const continue default delete do double
+else enum explicit export extern false float for friend goto if inline int long mutable namespace new noexcept not nullptr
+operator or private protected public register requires return short signed sizeof static struct switch template this throw true
+try typedef typename union unsigned using virtual void volatile while xor""".split())
+EXACT_IN_JSON = 2**53
 
 
 def camel(name):
     return "".join(part.capitalize() for part in name.split("_"))
 
 
-def text_of(node):
-    return " ".join((node.text or "").split()) if node is not None else ""
+def member(name):
+    return name + "_" if name in KEYWORDS else name
 
 
-def crc_mcrf4xx(data, crc=0xFFFF):
-    """CRC-16/MCRF4XX: polynomial 0x1021 reflected, initial 0xFFFF, no final XOR."""
-    for byte in data:
-        crc ^= byte
-        for _ in range(8):
-            crc = (crc >> 1) ^ 0x8408 if crc & 1 else crc >> 1
-    return crc
+def cpp_type(f):
+    element = f.type if f.type in ("float", "double", "char") else f"std::{f.type}"
+    return f"std::array<{element}, {f.length}>" if f.length else element
 
 
-def crc_extra(message):
-    crc = crc_mcrf4xx(f"{message.name} ".encode())
-    for field in message.fields:
-        if field.extension:
-            continue
-        crc = crc_mcrf4xx(f"{field.type} {field.name} ".encode(), crc)
-        if field.length:
-            crc = crc_mcrf4xx(bytes([field.length]), crc)
-    return (crc & 0xFF) ^ (crc >> 8)
+def field_doc(f):
+    doc = f"[{f.units}] {f.doc}" if f.units else f.doc
+    return f"{doc} Not known: {f.invalid}." if f.invalid else doc
 
 
-def read_field(node, extension, message):
-    element, _, rest = node.get("type").partition("[")
-    element = element.removesuffix("_mavlink_version")
-    if element not in SIZES:
-        fail(f"{message}.{node.get('name')}: unknown type {element}")
-    doc = text_of(node)
-    if node.get("units"):
-        doc = f"[{node.get('units')}] {doc}"
-    if node.get("invalid"):
-        doc += f" Not known: {node.get('invalid')}."
-    return Field(node.get("name"), element, int(rest.rstrip("]")) if rest else 0, extension, doc)
+def short_names(enum):
+    """Entry names without what they share; whole where that would make two of them one."""
+    def shortened(name):
+        return name.removeprefix(enum.name + "_") if name.startswith(enum.name + "_") else name.removeprefix("MAV_")
+    names = [camel(shortened(e.name)) for e in enum.entries]
+    return names if len(set(names)) == len(names) else [e.name for e in enum.entries]
 
 
-def read_message(node):
-    name = node.get("name")
-    base, extensions = [], []
-    target = base
-    for child in node:
-        if child.tag == "extensions":
-            target = extensions
-        elif child.tag == "field":
-            target.append(read_field(child, target is extensions, name))
-    fields = sorted(base, key=lambda f: -SIZES[f.type]) + extensions
-    offset = 0
-    for field in fields:
-        field.offset = offset
-        offset += field.bytes
-    message = Message(int(node.get("id")), name, text_of(node.find("description")), fields)
-    if len({f.name for f in fields}) != len(fields):
-        fail(f"{name}: a field name occurs twice")
-    if not 0 < message.max_length <= MAX_PAYLOAD:
-        fail(f"{name}: payload of {message.max_length} bytes")
-    message.crc_extra = crc_extra(message)
-    return message
+def write_enum(enum, out):
+    if not enum.entries:
+        return
+    values = [e.value for e in enum.entries]
+    signed = min(values) < 0
+    bits = next(b for b in (8, 16, 32, 64) if max(values) < 1 << (b - signed) and min(values) >= -(1 << (b - 1)))
+    out.append(f"/// {enum.doc}")
+    out.append(f"namespace {member(enum.name.lower())} {{")
+    for entry, short in zip(enum.entries, short_names(enum)):
+        params = ", ".join(f"p{index} {text}" for index, text in entry.params)
+        doc = " ".join(part for part in (entry.doc, f"({params})" if params else "") if part)
+        suffix = "u" if entry.value >= 1 << 63 else ""
+        out.append(f"inline constexpr std::{'' if signed else 'u'}int{bits}_t k{short} = {entry.value}{suffix};" +
+                   (f"  ///< {doc}" if doc else ""))
+    out.append(f"}}  // namespace {enum.name.lower()}\n")
 
 
-def read_messages(root):
-    messages = sorted((read_message(node) for node in root.iter("message")), key=lambda m: m.id)
-    for what in ("id", "name"):
-        values = [getattr(m, what) for m in messages]
-        if len(set(values)) != len(values):
-            fail(f"a message {what} occurs twice")
-    return messages
-
-
-def write_enum(node, out):
-    name, entries = node.get("name"), node.findall("entry")
-    values = [int(entry.get("value")) for entry in entries]
-    bits = next(b for b in (8, 16, 32, 64) if max(values) < 1 << b)
-    out.append(f"/// {text_of(node.find('description'))}")
-    out.append(f"namespace {name.lower()} {{")
-    for entry, value in zip(entries, values):
-        full = entry.get("name")
-        short = full.removeprefix(name + "_") if full.startswith(name + "_") else full.removeprefix("MAV_")
-        doc = text_of(entry.find("description"))
-        params = ", ".join(f"p{p.get('index')} {text_of(p)}" for p in entry.findall("param"))
-        doc = " ".join(part for part in (doc, f"({params})" if params else "") if part)
-        out.append(f"inline constexpr std::uint{bits}_t k{camel(short)} = {value};" + (f"  ///< {doc}" if doc else ""))
-    out.append(f"}}  // namespace {name.lower()}\n")
-
-
-def write_message(m, out):
+def write_struct(m, out):
+    name = camel(m.name)
     out.append(f"/// {m.name} ({m.id}). {m.doc}")
-    out.append(f"struct {m.cpp_name} {{")
+    out.append(f"struct {name} {{")
     out.append(f"  static constexpr std::uint32_t kId = {m.id};")
     out.append(f"  static constexpr std::uint8_t kCrcExtra = {m.crc_extra};")
     out.append(f"  static constexpr std::size_t kMinLength = {m.min_length};")
     out.append(f"  static constexpr std::size_t kMaxLength = {m.max_length};")
     out.append(f'  static constexpr const char* kName = "{m.name}";\n')
-    out.extend(f"  {f.cpp_type} {f.name}{{}};  ///< {f.doc}" for f in m.fields)
+    out.extend(f"  {cpp_type(f)} {member(f.name)}{{}};  ///< {field_doc(f)}" for f in m.fields)
     out.append("\n  /// Writes kMaxLength bytes. Realtime-safe: yes.")
     out.append("  void pack(std::uint8_t* payload) const noexcept {")
-    out.extend(f"    wire::put(payload + {f.offset}, {f.name});" for f in m.fields)
+    out.extend(f"    wire::put(payload + {f.offset}, {member(f.name)});" for f in m.fields)
     out.append("  }\n  /// A short payload reads as zero beyond its end, surplus is ignored. Realtime-safe: yes.")
-    out.append(f"  static {m.cpp_name} unpack(const std::uint8_t* payload, std::size_t length) noexcept {{")
+    out.append(f"  static {name} unpack(const std::uint8_t* payload, std::size_t length) noexcept {{")
     out.append("    const auto full = wire::full_length<kMaxLength>(payload, length);")
-    out.append(f"    {m.cpp_name} message;")
-    out.extend(f"    wire::get(full.data() + {f.offset}, message.{f.name});" for f in m.fields)
+    out.append(f"    {name} message;")
+    out.extend(f"    wire::get(full.data() + {f.offset}, message.{member(f.name)});" for f in m.fields)
     out.append("    return message;\n  }")
     out.append("  /// Calls visit(name, offset in the payload, field, is an extension) for each field in wire order.")
     out.append("  template <class Self, class Visit>\n  static void for_each_field(Self& self, Visit&& visit) {")
-    out.extend(f'    visit("{f.name}", std::size_t{{{f.offset}}}, self.{f.name}, {str(f.extension).lower()});'
+    out.extend(f'    visit("{f.name}", std::size_t{{{f.offset}}}, self.{member(f.name)}, {str(f.extension).lower()});'
                for f in m.fields)
     out.append("  }\n};\n")
 
 
-def write_table(messages, out):
+def write_table(messages, structs, out):
     out.append("/// Every message, rising in id.")
     out.append(f"inline constexpr std::array<MessageInfo, {len(messages)}> kMessages = {{{{")
     out.extend(f'    {{{m.id}, "{m.name}", {m.crc_extra}, {m.min_length}, {m.max_length}}},' for m in messages)
     out.append("}};\n")
-    out.append("/// Calls visit.template operator()<Message>() for every message type, rising in id.")
+    out.append("/// Calls visit.template operator()<Message>() for every message that has a struct, rising in id.")
     out.append("template <class Visit>\nvoid for_each_message(Visit&& visit) {")
-    out.extend(f"  visit.template operator()<{m.cpp_name}>();" for m in messages)
+    out.extend(f"  visit.template operator()<{camel(m.name)}>();" for m in structs)
     out.append("}\n")
 
 
-def main():
-    if len(sys.argv) != 3:
-        fail("usage: generate.py definitions.xml header.h")
-    root = ElementTree.parse(sys.argv[1]).getroot()
-    messages = read_messages(root)
-    out = ["// MAVLink messages as structs. Written by messages/generate.py from messages/wasp.xml; not to be edited.",
+def header_text(definition, table_only):
+    structs = [m for m in definition.messages if os.path.basename(m.file) not in table_only]
+    out = ["// MAVLink messages as structs. Written by messages/generate.py from messages/*.xml; not to be edited.",
            "#pragma once\n", "#include <array>\n#include <cstddef>\n#include <cstdint>\n",
            '#include "messages/message_info.h"\n', "namespace wasp::mavlink {\n"]
-    for node in root.iter("enum"):
-        write_enum(node, out)
-    for message in messages:
-        write_message(message, out)
-    write_table(messages, out)
+    for enum in definition.enums.values():
+        write_enum(enum, out)
+    for message in structs:
+        write_struct(message, out)
+    write_table(definition.messages, structs, out)
     out.append("}  // namespace wasp::mavlink\n")
-    with open(sys.argv[2], "w", encoding="utf-8") as file:
-        file.write("\n".join(out))
+    return "\n".join(out)
+
+
+def without_blanks(**values):
+    return {key: value for key, value in values.items() if value not in ("", False)}
+
+
+def json_number(value):
+    return value if abs(value) <= EXACT_IN_JSON else str(value)
+
+
+def json_text(definition):
+    """All a decoder needs: offsets in the payload, little-endian without padding; array_length 0 is not an array."""
+    messages = [{"id": m.id, "name": m.name, "crc_extra": m.crc_extra, "min_length": m.min_length,
+                 "max_length": m.max_length, **without_blanks(description=m.doc),
+                 "fields": [{"name": f.name, "type": f.type, "offset": f.offset, "array_length": f.length,
+                             "extension": f.extension,
+                             **without_blanks(units=f.units, enum=f.enum, invalid=f.invalid, display=f.display,
+                                              instance=f.instance, description=f.doc)} for f in m.fields]}
+                for m in definition.messages]
+    enums = {e.name: {"bitmask": e.bitmask, **without_blanks(description=e.doc),
+                      "entries": [{"name": x.name, "value": json_number(x.value), **without_blanks(description=x.doc),
+                                   **({"params": {i: t for i, t in x.params}} if x.params else {})} for x in e.entries]}
+             for e in definition.enums.values()}
+    return json.dumps({"format": "wasp MAVLink description", "format_version": 1, "byte_order": "little",
+                       "messages": messages, "enums": enums}, indent=1, ensure_ascii=False) + "\n"
+
+
+def write(path, text):
+    with open(path, "w", encoding="utf-8") as file:
+        file.write(text)
+
+
+def main():
+    arguments = argparse.ArgumentParser(description="MAVLink definition to C++ structs and JSON description")
+    arguments.add_argument("definition")
+    arguments.add_argument("--header")
+    arguments.add_argument("--json")
+    arguments.add_argument("--table-only", action="append", default=[])
+    options = arguments.parse_args()
+    try:
+        definition = read_definition(options.definition)
+    except Invalid as error:
+        sys.exit(f"generate.py: {error}")
+    if options.header:
+        write(options.header, header_text(definition, options.table_only))
+    if options.json:
+        write(options.json, json_text(definition))
 
 
 if __name__ == "__main__":

@@ -102,7 +102,7 @@ std::uint64_t digest_of(std::span<const std::uint8_t> bytes) {
 /// A frame of any known message with any payload, of the autopilot or of somebody else, and its checksum.
 void append_frame(FuzzInput& in, std::vector<std::uint8_t>& out) {
   const auto how = in.take<std::uint8_t>();
-  const auto& info = mavlink::kMessages[in.take<std::uint8_t>() % mavlink::kMessages.size()];
+  const auto& info = mavlink::kMessages[in.take<std::uint16_t>() % mavlink::kMessages.size()];
   const bool v1 = (how & 1) != 0 && info.id < 256, is_signed = !v1 && (how & 2) != 0;
   const std::size_t length = v1 ? info.min_length : (how & 4) != 0 ? in.take<std::uint8_t>() : info.max_length;
   const std::uint8_t system = (how & 8) != 0 ? in.take<std::uint8_t>() : std::uint8_t{1};

@@ -3,10 +3,14 @@
 import os
 import re
 import struct
+import sys
 import zlib
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 HOUSE = os.path.dirname(os.path.dirname(HERE))
+sys.path.insert(0, os.path.join(HOUSE, "messages"))
+sys.dont_write_bytecode = True
+from definition import read_definition  # noqa: E402
 
 
 def save(target, name, content):
@@ -46,12 +50,13 @@ save("mavlink", "unknown", raw + frame(2, 12345, 7, bytes(20)) + frame(2, *HEART
 save("mavlink", "broken", raw + frame(2, *ATTITUDE, attitude)[:-5] + frame(2, *HEARTBEAT, bytes(9), 1))
 save("mavlink", "command", raw + frame(2, *COMMAND_LONG, struct.pack("<7fH3B", 1, 0, 0, 0, 0, 0, 0, 400, 1, 191, 0), system=255))
 # the first byte odd: a script (mavlink_fuzz.cpp: 0 bytes, 1 time passes, 2 we ask for the time, 3 restart, else a frame)
-for first in range(0, 56, 8):  # each message, full of a payload that reads as numbers
-    frames = (bytes([4, 4, row, 60, row]) + struct.pack("<15f", *[0.5] * 15) for row in range(first, first + 8))
-    save("mavlink", f"script_messages{first:02}", b"\x01" + b"".join(frames))
+rows = [m.id for m in read_definition(os.path.join(HOUSE, "messages/wasp.xml")).messages]
+heard = [0, 4, 26, 27, 30, 31, 75, 76, 77, 105, 111, 253]  # by the link
+for part in range(2):  # full of a payload that reads as numbers
+    frames = (struct.pack("<BBHBB15f", 4, 4, rows.index(i), 60, i, *[0.5] * 15) for i in heard[part::2])
+    save("mavlink", f"script_messages{part}", b"\x01" + b"".join(frames))
 ask = bytes([1]) + struct.pack("<I", 7_000_000) + b"\x02"
-row_of_timesync = 33
-save("mavlink", "script_clock", b"\x01" + (ask + bytes([4, 0, row_of_timesync, 0]) + struct.pack("<qq", 10**12, 7_000_000)) * 4)
+save("mavlink", "script_clock", b"\x01" + (ask + struct.pack("<BBHB", 4, 0, rows.index(111), 0) + struct.pack("<qq", 10**12, 7_000_000)) * 4)
 
 # Configurations: each section of ours alone, and the whole without its comments
 

@@ -118,7 +118,7 @@ TEST(FrameParser, PassesOverAnUnknownMessageWithAFrameInsideIt) {
   Parser parser;
   ids(parser, encoded(encoder, beat()));
   Encoder recorded(1, 1);
-  Bytes stream = frame_v2(110, 84, encoded(recorded, CommandLong{1}), 0, 1);  // a file transfer that carries a log
+  Bytes stream = frame_v2(20001, 84, encoded(recorded, CommandLong{1}), 0, 1);  // say, a file transfer that carries a log
   encoder.set_sequence(2);
   append(stream, encoded(encoder, beat()));
   EXPECT_EQ(ids(parser, stream), Ids{0});
@@ -158,7 +158,7 @@ TEST(FrameParser, CountsSequenceGapsPerSource) {
 TEST(FrameParser, UnknownMessagesAreNotLost) {
   Parser parser;
   Bytes stream = frame_v2(0, Heartbeat::kCrcExtra, {1}, 0, 1);
-  append(stream, frame_v2(42, 28, {1, 2}, 0, 2));
+  append(stream, frame_v2(20001, 28, {1, 2}, 0, 2));
   append(stream, frame_v2(0, Heartbeat::kCrcExtra, {1}, 0, 3));
   append(stream, frame_v2(0, Heartbeat::kCrcExtra, {1}, 0, 5));
   ids(parser, stream);
