@@ -3,9 +3,9 @@
 #include <memory>
 
 #include "benchmarks/vision_rows.h"
+#include "drivers/kinect_depth.h"
 #include "vision/kernels/emd_grid.h"
 #include "vision/kernels/heading_log_polar.h"
-#include "vision/kernels/kinect_depth.h"
 
 namespace wasp::bench {
 
@@ -29,7 +29,7 @@ std::vector<VisionRow> frame_rows(const VisionData& data) {
   heading.inputs = correlators.inputs;
   heading.bound = "at most 6 regions";
   heading.ours = [=](int i) { keep(maps->step(image(i))); };
-  const auto table = std::make_shared<vision::KinectTable>(vision::make_kinect_table(vision::KinectModel::kTangent));
+  const auto table = std::make_shared<drivers::KinectTable>(drivers::make_kinect_table(drivers::kMagnenatTangent));
   const auto depth = std::make_shared<std::vector<std::uint16_t>>(std::size_t{kVisionWidth} * kVisionHeight);
   VisionRow kinect;
   kinect.name = "kinect_depth";
@@ -37,7 +37,7 @@ std::vector<VisionRow> frame_rows(const VisionData& data) {
   kinect.inputs = data.names(data.depth);
   kinect.bound = "fixed trip counts";
   kinect.ours = [=, &data](int i) {
-    vision::kinect_depth(*table, data.depth[static_cast<std::size_t>(i)].view(), depth->data(), kVisionWidth);
+    drivers::kinect_depth(*table, data.depth[static_cast<std::size_t>(i)].view(), depth->data(), kVisionWidth);
     keep(*depth);
   };
   return {correlators, heading, kinect};

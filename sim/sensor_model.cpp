@@ -14,9 +14,10 @@
 namespace wasp::sim {
 namespace {
 
-constexpr float kRawOffset = 3.3309495161f, kRawScale = 0.0030711016f;  ///< 1/z = offset - scale * raw
+constexpr drivers::KinectDepthModel kModel = drivers::kBurrusLinear;
+constexpr auto kRawOffset = static_cast<float>(kModel.coefficients[1]);  ///< 1/z = offset - scale * raw
+constexpr auto kRawScale = static_cast<float>(-kModel.coefficients[0]);
 constexpr float kBaseline_m = 0.075f;
-constexpr int kNoReading = 2047;
 
 WASP_SIM_WIDE void quantise(const float* depth_m, std::int32_t* raw, int width, std::uint32_t key, float noise_steps,
                             float dropout) {
@@ -29,7 +30,7 @@ WASP_SIM_WIDE void quantise(const float* depth_m, std::int32_t* raw, int width, 
     const float lost = dropout * (1.f + 9.f * far * far * far * far);
     const bool dropped = uniform_of(hash * 0x9e3779b9u) < lost || depth_m[u] <= 0.f;
     const auto value = static_cast<std::int32_t>(std::min(std::max(noisy + 0.5f, 0.f), 2046.f));
-    raw[u] = dropped ? kNoReading : value;
+    raw[u] = dropped ? drivers::kKinectNoReading : value;
   }
 }
 
@@ -45,24 +46,12 @@ WASP_SIM_WIDE void expose(const float* luminance, std::uint8_t* out, int width, 
 
 }  // namespace
 
-std::array<std::uint16_t, 2048> raw_to_mm_table(float min_range_m, float max_range_m) {
-  std::array<std::uint16_t, 2048> table{};
-  for (int raw = 0; raw < kNoReading; ++raw) {
-    const float inverse = kRawOffset - kRawScale * static_cast<float>(raw);
-    const float z = inverse > 0 ? 1 / inverse : 0;
-    const bool in_range = z >= min_range_m && z <= max_range_m;
-    table[static_cast<std::size_t>(raw)] =
-        in_range ? static_cast<std::uint16_t>(std::lround(z * 1000)) : std::uint16_t{0};
-  }
-  return table;
-}
-
 SensorModel::SensorModel(const SensorParams& params, int width_px, float fx_px, std::uint32_t seed)
     : params_(params),
       width_px_(width_px),
       projector_px_m_(fx_px * kBaseline_m),
       seed_(mix(seed)),
-      to_mm_(raw_to_mm_table(params.min_range_m, params.max_range_m)),
+      to_mm_(drivers::make_kinect_table({kModel.kind, kModel.coefficients, {params.min_range_m, params.max_range_m}})),
       raw_(static_cast<std::size_t>(width_px)),
       seen_(static_cast<std::size_t>(width_px)) {}
 
@@ -97,7 +86,7 @@ void SensorModel::depth_row(std::uint32_t frame, int row, const float* depth_m, 
   quantise(depth_m, raw_.data(), width_px_, row_key(frame, row, 1), params_.depth_noise_steps, params_.dropout);
   mark_shadows(depth_m);
   for (std::size_t u = 0; u < raw_.size(); ++u)
-    out_mm[u] = seen_[u] != 0 ? to_mm_[static_cast<std::size_t>(raw_[u])] : std::uint16_t{0};
+    out_mm[u] = seen_[u] != 0 ? to_mm_.mm[static_cast<std::size_t>(raw_[u])] : std::uint16_t{0};
 }
 
 void SensorModel::gray_row(std::uint32_t frame, int row, const float* luminance, std::uint8_t* out) const {

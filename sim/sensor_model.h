@@ -1,7 +1,7 @@
 // From ideal images to what a Kinect delivers.
 //
 // Depth: a structured-light camera measures disparity. Raw value r = (3.3309 - 1/z) / 0.0030711 (11 bits, the
-// well-known linear-in-disparity calibration by Magnenat and Burrus), so one step is 0.0030711 z^2 [m]. Gaussian noise
+// well-known linear-in-disparity calibration by Burrus, drivers/kinect_depth.h), so one step is 0.0030711 z^2 [m]. Gaussian noise
 // of 0.36 steps before rounding gives, with the rounding, sigma = 1.42e-3 z^2 [m], the law measured by Khoshelham and
 // Elberink (Sensors 12, 2012). Holes: where the projector, 7.5 cm to the right, is hidden by something nearer; where it
 // grazes; outside 0.4 ... 7 m; and a few at random, more with distance.
@@ -11,9 +11,10 @@
 // Every number is a pure function of (seed, frame, pixel): the same frame comes out whoever renders it and when.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <vector>
+
+#include "drivers/kinect_depth.h"
 
 namespace wasp::sim {
 
@@ -26,9 +27,6 @@ struct SensorParams {
   float read_noise = 1.2f;      ///< standard deviation, pixel values
   float photon_noise = 0.012f;  ///< variance per pixel value
 };
-
-/// Depth of each raw value in millimetres; 0 for values that stand for no depth.
-std::array<std::uint16_t, 2048> raw_to_mm_table(float min_range_m, float max_range_m);
 
 class SensorModel {
  public:
@@ -49,7 +47,7 @@ class SensorModel {
   int width_px_;
   float projector_px_m_;  ///< f B: disparity [px] times depth [m]
   std::uint32_t seed_;
-  std::array<std::uint16_t, 2048> to_mm_;
+  drivers::KinectTable to_mm_;
   std::vector<std::int32_t> raw_;
   std::vector<std::uint8_t> seen_;  ///< 1 where the projector's light arrives
 };

@@ -43,7 +43,7 @@ TEST(SensorModel, DepthNoiseGrowsWithTheSquareOfDepth) {
 }
 
 TEST(SensorModel, ReadingsAreQuantisedInDisparity) {
-  const auto table = raw_to_mm_table(0.4f, 7.f);
+  const auto table = drivers::make_kinect_table(drivers::kBurrusLinear).mm;
   int values = 0;
   for (std::size_t raw = 1; raw < table.size(); ++raw) {
     values += table[raw] != 0;

@@ -1,4 +1,4 @@
-#include "vision/kernels/kinect_depth.h"
+#include "drivers/kinect_depth.h"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 #include "rt/contract.h"
 #include "tests/support/malloc_guard.h"
 
-namespace wasp::vision {
+namespace wasp::drivers {
 namespace {
 
 /// The sensor's geometry (Khoshelham and Elberink 2012): baseline 75 mm, f 580 px, raw disparity in eighths of a pixel
@@ -20,27 +20,28 @@ float from_geometry_m(int raw) { return 0.075f * 580.f * 8.f / (1090.f - static_
 TEST(KinectDepth, ModelsAgreeWithTheSensorsGeometry) {
   for (int raw = 500; raw <= 1000; raw += 10) {
     const float want = from_geometry_m(raw);
-    EXPECT_NEAR(kinect_depth_m(KinectModel::kTangent, raw), want, 0.03f * want) << raw;
+    EXPECT_NEAR(kinect_depth_m(kMagnenatTangent, raw), want, 0.03f * want) << raw;
+    EXPECT_NEAR(kinect_depth_m(kBurrusLinear, raw), want, 0.06f * want) << raw;
     if (raw < 650) continue;
-    EXPECT_NEAR(kinect_depth_m(KinectModel::kTwoGaussians, raw), want, 0.11f * want) << raw;
+    EXPECT_NEAR(kinect_depth_m(kThesisGaussians, raw), want, 0.11f * want) << raw;
   }
 }
 
 /// The thesis' fit reads a third short up close: where the geometry says 0.60 m, it says 0.41 m.
 TEST(KinectDepth, TwoGaussiansReadShortUpClose) {
-  EXPECT_LT(kinect_depth_m(KinectModel::kTwoGaussians, 510), 0.7f * from_geometry_m(510));
+  EXPECT_LT(kinect_depth_m(kThesisGaussians, 510), 0.7f * from_geometry_m(510));
 }
 
 TEST(KinectDepth, TwoGaussiansAreInCentimetresAsPrinted) {
   const double want_cm = 3.169e4 * std::exp(-std::pow((800 - 1338.0) / 140.4, 2)) +
                          6.334e18 * std::exp(-std::pow((800 - 2.035e4) / 3154.0, 2));
-  EXPECT_NEAR(kinect_depth_m(KinectModel::kTwoGaussians, 800), want_cm / 100, 1e-5);
-  EXPECT_GT(kinect_depth_m(KinectModel::kTwoGaussians, 800), 1.0f);
-  EXPECT_LT(kinect_depth_m(KinectModel::kTwoGaussians, 800), 1.5f);
+  EXPECT_NEAR(kinect_depth_m(kThesisGaussians, 800), want_cm / 100, 1e-5);
+  EXPECT_GT(kinect_depth_m(kThesisGaussians, 800), 1.0f);
+  EXPECT_LT(kinect_depth_m(kThesisGaussians, 800), 1.5f);
 }
 
 TEST(KinectDepth, ValidValuesAreOneRisingRunInsideTheRange) {
-  for (const KinectModel model : {KinectModel::kTwoGaussians, KinectModel::kTangent}) {
+  for (const KinectDepthModel& model : {kThesisGaussians, kMagnenatTangent, kBurrusLinear}) {
     const KinectTable table = make_kinect_table(model);
     int runs = 0, last = 0;
     for (const int mm : table.mm) {
@@ -60,7 +61,7 @@ TEST(KinectDepth, ValidValuesAreOneRisingRunInsideTheRange) {
 
 TEST(KinectDepth, ConvertsAnImageAlsoInPlaceAndIgnoresWhatIsNotElevenBits) {
   std::mt19937 random(1);
-  const KinectTable table = make_kinect_table(KinectModel::kTangent);
+  const KinectTable table = make_kinect_table(kMagnenatTangent);
   std::vector<std::uint16_t> raw(20 * 7);
   for (auto& x : raw) x = static_cast<std::uint16_t>(random());
   raw[3] = 700;
@@ -74,28 +75,54 @@ TEST(KinectDepth, ConvertsAnImageAlsoInPlaceAndIgnoresWhatIsNotElevenBits) {
       EXPECT_EQ(out[v * 23 + u], r < 2048 ? table.mm[static_cast<std::size_t>(r)] : 0);
     }
   EXPECT_EQ(out[20], 9);  // beyond the row
-  EXPECT_NEAR(out[3], 1000 * kinect_depth_m(KinectModel::kTangent, 700), 0.51);
+  EXPECT_NEAR(out[3], 1000 * kinect_depth_m(kMagnenatTangent, 700), 0.51);
   const std::uint16_t first = table.mm[std::min<std::size_t>(raw[0], 2047)];
   ASSERT_TRUE(kinect_depth(table, {raw.data(), 20, 7, 20}, raw.data(), 20));
   EXPECT_EQ(raw[0], first);
 }
 
+TEST(KinectDepth, TheRawValueOfADepthIsTheNearestThereIs) {
+  for (const KinectDepthModel& model : {kThesisGaussians, kMagnenatTangent, kBurrusLinear}) {
+    const KinectTable table = make_kinect_table(model);
+    for (int mm = 405; mm < 6900; ++mm) {
+      const int raw = kinect_raw(table, mm);
+      ASSERT_LT(raw, kKinectNoReading) << mm;
+      const auto error = [&](int r) { return std::abs(table.mm[static_cast<std::size_t>(r)] - mm); };
+      EXPECT_LE(error(raw), error(raw - 1)) << mm;
+      if (table.mm[static_cast<std::size_t>(raw) + 1] != 0) {
+        EXPECT_LE(error(raw), error(raw + 1)) << mm;
+      }
+    }
+    for (const int none : {0, -5, 300, 7200, 65535}) EXPECT_EQ(kinect_raw(table, none), kKinectNoReading) << none;
+    EXPECT_EQ(kinect_raw(KinectTable{}, 1000), kKinectNoReading);
+  }
+}
+
+TEST(KinectDepth, NamesFindThePublishedModels) {
+  KinectDepthModel model;
+  for (const KinectDepthModel& want : {kThesisGaussians, kMagnenatTangent, kBurrusLinear}) {
+    ASSERT_TRUE(published_model(name_of(want.kind), model));
+    EXPECT_EQ(model.coefficients, want.coefficients);
+  }
+  EXPECT_FALSE(published_model("parabola", model));
+}
+
 TEST(KinectDepth, RefusesBadInput) {
-  const KinectTable table = make_kinect_table(KinectModel::kTangent);
+  const KinectTable table = make_kinect_table(kMagnenatTangent);
   std::vector<std::uint16_t> raw(64, 700), out(64, 9);
   EXPECT_FALSE(kinect_depth(table, {}, out.data(), 8));
   EXPECT_FALSE(kinect_depth(table, {raw.data(), 8, 8, 4}, out.data(), 8));
   EXPECT_FALSE(kinect_depth(table, {raw.data(), 8, 8, 8}, nullptr, 8));
   EXPECT_FALSE(kinect_depth(table, {raw.data(), 8, 8, 8}, out.data(), 7));
   EXPECT_EQ(out[0], 9);
-  for (const int bad : {-1, 2047, 2048, 1 << 20}) EXPECT_EQ(kinect_depth_m(KinectModel::kTwoGaussians, bad), 0.f);
+  for (const int bad : {-1, 2047, 2048, 1 << 20}) EXPECT_EQ(kinect_depth_m(kThesisGaussians, bad), 0.f);
   for (const KinectRange& bad : {KinectRange{7.f, 0.4f}, KinectRange{std::nanf(""), 7.f}, KinectRange{-1.f, 7.f},
                                  KinectRange{0.4f, std::numeric_limits<float>::infinity()}})
-    EXPECT_EQ(make_kinect_table(KinectModel::kTangent, bad).mm[700], 0);
+    EXPECT_EQ(make_kinect_table({KinectModel::kTangent, kMagnenatTangent.coefficients, bad}).mm[700], 0);
 }
 
 TEST(KinectDepth, AllocatesNothing) {
-  const KinectTable table = make_kinect_table(KinectModel::kTangent);
+  const KinectTable table = make_kinect_table(kMagnenatTangent);
   std::vector<std::uint16_t> raw(640 * 480, 700);
   const test::MallocCount count;
   {
@@ -106,4 +133,4 @@ TEST(KinectDepth, AllocatesNothing) {
 }
 
 }  // namespace
-}  // namespace wasp::vision
+}  // namespace wasp::drivers
