@@ -5,6 +5,7 @@
 // A new driver is one class of this kind and one row in drivers/camera_table.cpp.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -32,6 +33,10 @@ struct CameraSettings {
   std::string trigger = "off";  ///< off | external
   int buffers = 4;              ///< exposures the device may hold before one is lost
   double readout_us = -1;       ///< from the end of the exposure to the device's time stamp; -1: the driver's estimate
+  std::string depth_mode;       ///< kinect: raw ("" as well) | registered | mm
+  std::string depth_model = "tangent";           ///< kinect, raw: two-gaussians | tangent | linear
+  std::vector<double> depth_coefficients;        ///< of that model (drivers/kinect_depth.h); empty: the published ones
+  std::array<float, 2> depth_range_m{0.4f, 7.f};  ///< kinect: nearer or farther counts as no reading
 };
 
 /// What the flight was promised.
@@ -57,7 +62,8 @@ struct CameraFormat {
 struct FrameStamp {
   TimeNs exposed_at_ns = 0;    ///< its middle
   std::uint32_t sequence = 0;  ///< a gap is a frame that was lost on the way; begins anew with open()
-  bool depth = true;           ///< false: this exposure came without its depth image
+  bool depth = true;           ///< false: this exposure came without its depth image, or it was published before
+  bool gray = true;            ///< false: the depth image alone; its grey one may follow with the same stamp, or not
   bool estimated = false;      ///< the device gave no time that can be believed: that of arrival stands in
 };
 
@@ -71,7 +77,7 @@ struct FrameSlot {
 class FrameSink {
  public:
   virtual ~FrameSink() = default;
-  /// Memory of the next exposure: the driver's own, and the same, until it is published.
+  /// Memory of the next exposure: the driver's own, and each image the same, until it is published.
   virtual FrameSlot slot() = 0;
   /// Optional, when publish() follows within 50 us: wakes sleeping readers early.
   virtual void announce() = 0;
@@ -105,6 +111,8 @@ class CameraDriver {
   virtual FrameEvent wait_frame(TimeNs deadline_ns) = 0;
   /// Lets the device go. May be called at any time, twice too.
   virtual void close() noexcept = 0;
+  /// What only this kind counts, since start(); for people. Empty: nothing.
+  [[nodiscard]] virtual std::string account() const { return {}; }
 };
 
 /// A camera that is plugged in.

@@ -2,6 +2,7 @@
 #include <array>
 
 #include "drivers/camera_driver.h"
+#include "drivers/kinect_camera.h"
 #include "drivers/v4l2_camera.h"
 
 namespace wasp::drivers {
@@ -10,6 +11,10 @@ std::span<const CameraDriverRow> camera_drivers() {
   static constexpr std::array kRows{
       CameraDriverRow{"v4l2", "cameras of the kernel's Video4Linux2, USB ones above all", false, make_v4l2_camera,
                       list_v4l2_cameras},
+#ifdef WASP_HAVE_FREENECT
+      CameraDriverRow{"kinect", "first-generation Kinects, through libfreenect", true, make_kinect_camera,
+                      list_kinect_cameras},
+#endif
   };
   return kRows;
 }
