@@ -36,10 +36,10 @@ std::optional<ExposureStamp> ExposurePairs::add_gray(TimeNs exposed_at_ns) noexc
   return std::nullopt;
 }
 
-std::optional<ExposureStamp> ExposurePairs::take_waiting(bool depth_came) noexcept {
+std::optional<ExposureStamp> ExposurePairs::take_waiting() noexcept {
   if (!waiting_) return std::nullopt;
   waiting_ = false;
-  return depth_came && belongs(waiting_at_ns_) ? join(waiting_at_ns_) : alone(waiting_at_ns_);
+  return belongs(waiting_at_ns_) ? join(waiting_at_ns_) : alone(waiting_at_ns_);
 }
 
 ExposureStamp ExposurePairs::join(TimeNs gray_at_ns) noexcept {

@@ -30,14 +30,16 @@ class ExposurePairs {
   /// `depth`: that kind comes at all.
   ExposurePairs(DurationNs period_ns, bool depth) : period_ns_(period_ns), depth_(depth) {}
 
-  /// A depth image came: its stamp. Call take_waiting(true) after publishing it.
+  /// A depth image came: its stamp. A grey image that waits is taken before it is published (alone), or, if it
+  /// waits_for_newest(), after.
   ExposureStamp add_depth(TimeNs exposed_at_ns) WASP_REALTIME;
-  /// A grey image came (take_waiting(false) first): the stamp to publish it with, or none: it has to wait.
+  /// A grey image came (take_waiting() first): the stamp to publish it with, or none: it has to wait.
   std::optional<ExposureStamp> add_gray(TimeNs exposed_at_ns) WASP_REALTIME;
   [[nodiscard]] bool waiting() const noexcept { return waiting_; }
-  /// The waiting grey image's stamp: with the newest depth image if that is its own, else, or when no depth came
-  /// (`depth_came` false), alone. None if none waits.
-  std::optional<ExposureStamp> take_waiting(bool depth_came) WASP_REALTIME;
+  /// One waits, and the newest depth image is its own.
+  [[nodiscard]] bool waits_for_newest() const WASP_REALTIME { return waiting_ && belongs(waiting_at_ns_); }
+  /// The waiting grey image's stamp: with the newest depth image if that is its own, else alone. None if none waits.
+  std::optional<ExposureStamp> take_waiting() WASP_REALTIME;
 
   [[nodiscard]] const PairCounts& counts() const noexcept { return counts_; }
 

@@ -118,7 +118,7 @@ class KinectCamera final : public CameraDriver {
     serving = this;
     for (;;) {
       const TimeNs now_ns = rt::now();
-      if (pairs_.waiting() && now_ns >= patience_ends_ns_) release_waiting(false);
+      if (pairs_.waiting() && now_ns >= patience_ends_ns_) release_waiting();
       if (came_ != FrameEvent::kTimeout) return came_;
       if (depth_stream_.stuck(now_ns) || video_stream_.stuck(now_ns)) return FrameEvent::kGone;
       const TimeNs until_ns = pairs_.waiting() ? std::min(deadline_ns, patience_ends_ns_) : deadline_ns;
@@ -201,7 +201,7 @@ class KinectCamera final : public CameraDriver {
 
   void on_depth(std::uint32_t ticks, TimeNs now_ns) {
     std::optional<FrameStamp> stamp = date(ticks, now_ns, KinectStream::kDepth, depth_, depth_stream_);
-    if (!stamp) return release_waiting(false);
+    if (!stamp) return release_waiting();
     std::uint16_t* pixels = sink_->slot().depth_mm;
     sink_->announce();
     if (depth_.format == FREENECT_DEPTH_11BIT)
@@ -209,15 +209,17 @@ class KinectCamera final : public CameraDriver {
     else
       keep_range(pixels);
     stamp->gray = false;
-    publish(*stamp, pairs_.add_depth(stamp->exposed_at_ns));
+    const ExposureStamp place = pairs_.add_depth(stamp->exposed_at_ns);
+    if (!pairs_.waits_for_newest()) release_waiting();
+    publish(*stamp, place);
     library_->set_depth_buffer(device_->get(), sink_->slot().depth_mm);
-    release_waiting(true);
+    release_waiting();
   }
 
   void on_video(std::uint32_t ticks, TimeNs now_ns) {
     std::optional<FrameStamp> stamp = date(ticks, now_ns, KinectStream::kVideo, video_, video_stream_);
     if (!stamp) return;
-    release_waiting(false);
+    release_waiting();
     std::uint8_t* gray = sink_->slot().gray;
     if (video_.format == FREENECT_VIDEO_IR_8BIT)
       crop_infrared(video_pixels_.data(), gray);
@@ -230,8 +232,8 @@ class KinectCamera final : public CameraDriver {
   }
 
   /// The grey image that waits in its slot for its depth.
-  void release_waiting(bool depth_came) {
-    if (const auto place = pairs_.take_waiting(depth_came)) publish(waiting_stamp_, *place);
+  void release_waiting() {
+    if (const auto place = pairs_.take_waiting()) publish(waiting_stamp_, *place);
   }
 
   void publish(FrameStamp stamp, const ExposureStamp& place) {
