@@ -30,7 +30,7 @@ rt::Thread start(std::function<void()> body) {
 
 WireTap::WireTap(const std::string& autopilot_path, std::string link_path)
     : link_path_(std::move(link_path)),
-      autopilot_(drivers::SerialEndpoint{autopilot_path, 921600}),
+      autopilot_(drivers::Endpoint{autopilot_path, 921600}),
       flight_(std::make_unique<sim::Pty>(link_path_)),
       thread_(start([this] { run(); })) {}
 

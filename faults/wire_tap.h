@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "drivers/serial_port.h"
+#include "drivers/line_port.h"
 #include "faults/inheriting_mutex.h"
 #include "faults/stretch.h"
 #include "faults/wire_fault.h"
@@ -50,7 +50,7 @@ class WireTap {
   void write(Direction direction, std::span<const std::uint8_t> bytes);
 
   std::string link_path_;
-  drivers::SerialPort autopilot_;
+  drivers::LinePort autopilot_;
   WireLog log_;
   mutable InheritingMutex mutex_;  ///< all below
   std::unique_ptr<sim::Pty> flight_;

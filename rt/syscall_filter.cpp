@@ -25,6 +25,10 @@ constexpr long kAllowed[] = {
     SYS_write,
     SYS_ppoll,
     SYS_ioctl,
+    // a line that is a socket
+    SYS_recvfrom,
+    SYS_sendto,
+    SYS_connect,
     SYS_getrusage,
 #ifdef SYS_poll
     SYS_poll,
@@ -37,6 +41,10 @@ constexpr long kAllowed[] = {
     SYS_close,
     SYS_dup3,
     SYS_fcntl,
+    SYS_socket,
+    SYS_bind,
+    SYS_setsockopt,
+    SYS_getsockopt,
     SYS_exit,
     SYS_exit_group,
     SYS_munmap,

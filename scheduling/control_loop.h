@@ -8,7 +8,7 @@
 
 #include "control/control_step.h"
 #include "drivers/autopilot_link.h"
-#include "drivers/serial_port.h"
+#include "drivers/line_port.h"
 #include "rt/periodic.h"
 #include "rt/seqlock.h"
 #include "scheduling/config.h"
@@ -38,7 +38,7 @@ struct ControlWiring {
   const shm::Region* flight = nullptr;
   StageTable* stages = nullptr;
   const rt::Seqlock<LinkReport>* link = nullptr;
-  drivers::SerialPort* port = nullptr;
+  drivers::LinePort* port = nullptr;
   drivers::AutopilotLink* autopilot = nullptr;
   EventQueue* events = nullptr;
   ThreadWatch* watch = nullptr;                            ///< required

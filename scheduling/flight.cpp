@@ -79,10 +79,10 @@ std::optional<GuardPage> adopt_guard(const FlightOptions& options) {
 }
 
 /// The serial line: the guardian's, or opened here.
-drivers::SerialPort open_line(const FlightOptions& options, const Config& config) {
-  const auto endpoint = drivers::SerialEndpoint::parse(config.endpoint);
-  return options.guarded ? drivers::SerialPort(endpoint, {kLineDescriptor, kLineSocketDescriptor})
-                         : drivers::SerialPort(endpoint);
+drivers::LinePort open_line(const FlightOptions& options, const Config& config) {
+  const auto endpoint = drivers::Endpoint::parse(config.endpoint);
+  return options.guarded ? drivers::LinePort(endpoint, {kLineDescriptor, kLineSocketDescriptor})
+                         : drivers::LinePort(endpoint);
 }
 
 /// Everything one flight owns, in order of construction; destroyed in reverse, threads first.
@@ -336,7 +336,7 @@ class Flight {
   StageTable& stages_;
   WatchBoard board_;
   DurationNs frame_period_ns_ = 0;
-  drivers::SerialPort port_;
+  drivers::LinePort port_;
   drivers::AutopilotLink autopilot_;
   std::unique_ptr<shm::Region> camera_;
   std::map<std::string, BehaviourScript> scripts_;

@@ -65,7 +65,7 @@ Guardian::Guardian(GuardPlan plan, std::vector<std::string> command, bool real_t
       command_(std::move(command)),
       real_time_(real_time),
       signals_fd_(open_signals()),
-      port_(drivers::SerialEndpoint::parse(plan_.endpoint)),
+      port_(drivers::Endpoint::parse(plan_.endpoint)),
       watchdog_(plan_.guard.watchdog),
       page_(GuardPage::create()),
       voice_(identity_of(plan_)) {
@@ -128,7 +128,7 @@ void Guardian::wait(TimeNs until_ns) {
                                pollfd{line_gone_ ? -1 : port_.fd(), 0, 0}};
   const timespec patience = rt::to_timespec(std::max<DurationNs>(until_ns - rt::now(), 0));
   ppoll(wanted.data(), wanted.size(), &patience, nullptr);
-  if ((wanted[2].revents & (POLLHUP | POLLERR | POLLNVAL)) != 0) line_gone_ = true;
+  if (wanted[2].revents != 0 && port_.hung_up(wanted[2].revents)) line_gone_ = true;
 }
 
 void Guardian::take_signals() {

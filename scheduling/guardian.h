@@ -8,7 +8,7 @@
 
 #include "drivers/autopilot_link.h"
 #include "drivers/line_handover.h"
-#include "drivers/serial_port.h"
+#include "drivers/line_port.h"
 #include "scheduling/flight_child.h"
 #include "scheduling/guard_config.h"
 #include "scheduling/guard_page.h"
@@ -42,7 +42,7 @@ class Guardian {
   bool real_time_;
   cpu_set_t cores_{};
   int signals_fd_ = -1;
-  drivers::SerialPort port_;
+  drivers::LinePort port_;
   HardwareWatchdog watchdog_;
   GuardPage page_;
   drivers::AutopilotLink voice_;  ///< encodes

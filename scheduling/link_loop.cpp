@@ -15,10 +15,11 @@ constexpr int kReadsPerWake = 8;
 constexpr DurationNs kQuiet = 1 * kSecond;            // after it a refusal is news again
 constexpr DurationNs kStranger = 300 * kMillisecond;  // others speak, the autopilot does not: say so
 constexpr DurationNs kStrangerPeriod = 10 * kSecond;
+constexpr DurationNs kMovedAfter = 2 * kSecond;  // a datagram peer so long silent may come back from another port
 constexpr DurationNs kAutopilotBeat = 200 * kMillisecond;
 }  // namespace
 
-LinkLoop::LinkLoop(const shm::Region& flight, drivers::SerialPort& port, drivers::AutopilotLink& autopilot,
+LinkLoop::LinkLoop(const shm::Region& flight, drivers::LinePort& port, drivers::AutopilotLink& autopilot,
                    StageTable& stages, rt::Seqlock<LinkReport>& report, EventQueue& events, ThreadWatch& watch)
     : port_(port),
       autopilot_(autopilot),
@@ -44,6 +45,7 @@ void LinkLoop::run(LoopControl& control) {
 
 void LinkLoop::serve(LoopControl& control) WASP_REALTIME {
   ask_for_time(rt::now());
+  if (rt::now() > peer_until_ns_) port_.forget_peer();
   if (!port_.wait_readable(rt::now() + kPatience)) return;
   const TimeNs woken_ns = rt::now();
   take(control);
@@ -64,6 +66,10 @@ void LinkLoop::take(LoopControl& control) WASP_REALTIME {
     received_at_ns_ = rt::now();
     heard_ = false;
     autopilot_.receive(std::span<const std::uint8_t>(buffer_.data(), got.bytes), received_at_ns_, *this);
+    if (heard_) {
+      peer_until_ns_ = received_at_ns_ + kMovedAfter;
+      port_.adopt_peer();
+    }
     if (heartbeat_seen_ && heard_) {  // before the first heartbeat `armed` would be a guess
       now_.heard_at_ns = received_at_ns_;
       report_.store(now_);

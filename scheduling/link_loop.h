@@ -4,8 +4,8 @@
 #pragma once
 
 #include "drivers/autopilot_link.h"
+#include "drivers/line_port.h"
 #include "drivers/sample_judge.h"
-#include "drivers/serial_port.h"
 #include "rt/seqlock.h"
 #include "scheduling/control_loop.h"
 #include "scheduling/events.h"
@@ -17,7 +17,7 @@ namespace wasp::scheduling {
 
 class LinkLoop {
  public:
-  LinkLoop(const shm::Region& flight, drivers::SerialPort& port, drivers::AutopilotLink& autopilot, StageTable& stages,
+  LinkLoop(const shm::Region& flight, drivers::LinePort& port, drivers::AutopilotLink& autopilot, StageTable& stages,
            rt::Seqlock<LinkReport>& report, EventQueue& events, ThreadWatch& watch);
   /// Runs until the stop flag. Real-time loop.
   void run(LoopControl& control);
@@ -45,7 +45,7 @@ class LinkLoop {
   void watch_the_other_side(RunStatus& status) WASP_REALTIME;
   void ask_for_beats() WASP_REALTIME;
 
-  drivers::SerialPort& port_;
+  drivers::LinePort& port_;
   drivers::AutopilotLink& autopilot_;
   shm::RingWriter imu_, attitude_;
   Stage *age_, *compute_;
@@ -54,7 +54,7 @@ class LinkLoop {
   ThreadWatch& watch_;
   SampleFaults faults_;
   LinkReport now_;
-  TimeNs received_at_ns_ = 0, timesync_due_ns_ = 0;
+  TimeNs received_at_ns_ = 0, timesync_due_ns_ = 0, peer_until_ns_ = 0;
   bool gone_ = false;
   bool heard_ = false;  ///< the autopilot itself spoke in the bytes at hand
   bool heartbeat_seen_ = false;

@@ -3,13 +3,13 @@
 // falls to the receiver's checksum.
 #pragma once
 
-#include "drivers/serial_port.h"
+#include "drivers/line_port.h"
 
 namespace wasp::scheduling {
 
 class SetpointLine {
  public:
-  explicit SetpointLine(drivers::SerialPort& port) : port_(port) {}
+  explicit SetpointLine(drivers::LinePort& port) : port_(port) {}
 
   struct Sent {
     bool setpoint_whole = false;  ///< its last byte was handed to the kernel
@@ -40,7 +40,7 @@ class SetpointLine {
     return port_.pending_output_bytes() > since;
   }
 
-  drivers::SerialPort& port_;
+  drivers::LinePort& port_;
   std::uint64_t written_total_ = 0;  ///< of the port, right after the last setpoint
   bool setpoint_waits_ = false;
 };

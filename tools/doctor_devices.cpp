@@ -38,6 +38,10 @@ std::optional<unsigned> flags_from_driver(const std::string& device) {
 Check check_tty(const DoctorPlan& plan) {
   Check c{"serial line", State::kOk, "",
           "a converter that collects bytes for 16 ms makes every attitude that much older"};
+  if (plan.tty.empty()) {
+    c.measured = "the autopilot is behind a socket";
+    return c;
+  }
   const std::string name = std::filesystem::path(plan.tty).filename().string();
   if (!plan.tree.exists("/sys/class/tty/" + name) && !plan.tree.exists(plan.tty)) {
     c.state = State::kUnknown;

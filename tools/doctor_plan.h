@@ -18,7 +18,7 @@ struct DoctorPlan {
   std::set<int> priorities;    ///< SCHED_FIFO, of the thread table
   int heap_mib = 64;
   DurationNs control_deadline_ns = 10 * kMillisecond, control_budget_ns = 2 * kMillisecond;
-  std::string tty;               ///< device of the configured endpoint, e.g. "/dev/ttyUSB0"
+  std::string tty;               ///< device of the configured endpoint, e.g. "/dev/ttyUSB0"; empty: a socket
   double seconds = 5;            ///< of the wake-up measurement
   std::string flight_under_way;  ///< its region, "" if none; then nothing is done that could disturb it
 

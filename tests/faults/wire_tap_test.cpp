@@ -14,8 +14,8 @@ struct Line {
   std::string folder = testing::TempDir() + "wasp_tap_" + std::to_string(getpid());
   sim::Pty autopilot{folder + ".autopilot"};
   WireTap tap{folder + ".autopilot", folder + ".flight"};
-  std::unique_ptr<drivers::SerialPort> flight =
-      std::make_unique<drivers::SerialPort>(drivers::SerialEndpoint{folder + ".flight", 921600});
+  std::unique_ptr<drivers::LinePort> flight =
+      std::make_unique<drivers::LinePort>(drivers::Endpoint{folder + ".flight", 921600});
 
   /// What the flight hears until `n` bytes, or ten seconds, have passed.
   std::vector<std::uint8_t> flight_hears(std::size_t n) {

@@ -9,6 +9,7 @@
 #include <signal.h>
 #include <sys/ioctl.h>
 #include <sys/resource.h>
+#include <sys/socket.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -27,8 +28,8 @@ int* __errno_location() noexcept WASP_ASSUMED;
 int clock_nanosleep(clockid_t, int, const timespec*, timespec*) WASP_ASSUMED;
 int ppoll(pollfd*, nfds_t, const timespec*, const sigset_t*) WASP_ASSUMED;
 
-// Only SYS_futex and SYS_futex_waitv are called by it: a wait with a deadline, or a wake. The system-call filter keeps it
-// so at run time.
+// Only SYS_futex and SYS_futex_waitv are called by it: a wait with a deadline, or a wake. The system-call filter keeps
+// it so at run time.
 long syscall(long, ...) noexcept WASP_ASSUMED;
 
 // The serial line, opened O_NONBLOCK: these return EAGAIN instead of waiting; poll is called with no patience.
@@ -36,6 +37,12 @@ ssize_t read(int, void*, size_t) WASP_ASSUMED;
 ssize_t write(int, const void*, size_t) WASP_ASSUMED;
 int poll(pollfd*, nfds_t, int) WASP_ASSUMED;
 int ioctl(int, unsigned long, ...) noexcept WASP_ASSUMED;
+
+// The same line where it is a socket, non-blocking as well; connect is called on datagram sockets alone, where it sets
+// an address and sends nothing.
+ssize_t recvfrom(int, void*, size_t, int, sockaddr*, socklen_t*) WASP_ASSUMED;
+ssize_t send(int, const void*, size_t, int) WASP_ASSUMED;
+int connect(int, const sockaddr*, socklen_t) WASP_ASSUMED;
 
 // A system call without waiting: page faults of this thread, once a loop.
 int getrusage(int, rusage*) noexcept WASP_ASSUMED;

@@ -74,7 +74,7 @@ class ControlBench {
       : instance_("test-control-" + std::to_string(getpid()) + "-" + std::to_string(count_++)),
         config_(configuration(options)),
         flight_(create_flight_region(instance_, {.names = {"maker"}}, false)),
-        port_(drivers::SerialEndpoint::parse(line_.endpoint())),
+        port_(drivers::Endpoint::parse(line_.endpoint())),
         autopilot_(drivers::LinkIdentity{}),
         cue_(flight_, shm::cue_topic("maker"), "Cue"),
         attitude_(flight_, shm::kAttitude, "Attitude"),
@@ -253,7 +253,7 @@ class ControlBench {
   PtyLine line_;
   Config config_;
   shm::Region flight_;
-  drivers::SerialPort port_;
+  drivers::LinePort port_;
   drivers::AutopilotLink autopilot_;
   shm::RingWriter cue_, attitude_, imu_;
   shm::RingReader commands_;

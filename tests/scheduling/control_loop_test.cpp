@@ -294,7 +294,7 @@ TEST(ControlLoop, SaysWhyAVehicleFoundArmedIsNotAdopted) {
 
 TEST(SetpointLine, AStalledLineIsFlushedSoThatNoOldSetpointGoesOutLater) {
   PtyLine line;
-  drivers::SerialPort port(drivers::SerialEndpoint::parse(line.endpoint()));
+  drivers::LinePort port(drivers::Endpoint::parse(line.endpoint()));
   SetpointLine setpoints(port);
   std::vector<std::uint8_t> setpoint(51, 0);
   int written = 0;

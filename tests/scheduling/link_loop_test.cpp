@@ -18,7 +18,7 @@ class LinkLoopTest : public ::testing::Test {
   LinkLoopTest()
       : instance_("test-link-" + std::to_string(getpid())),
         flight_(create_flight_region(instance_, {}, false)),
-        port_(drivers::SerialEndpoint::parse(line_.endpoint())),
+        port_(drivers::Endpoint::parse(line_.endpoint())),
         loop_(flight_, port_, link_, stage_table(flight_), report_, events_, board_.add({"link", -1, 0, kMillisecond})),
         attitude_(flight_, shm::kAttitude, "Attitude"),
         imu_(flight_, shm::kImu, "Imu") {
@@ -86,7 +86,7 @@ class LinkLoopTest : public ::testing::Test {
   std::string instance_;
   PtyLine line_;
   shm::Region flight_;
-  drivers::SerialPort port_;
+  drivers::LinePort port_;
   drivers::AutopilotLink link_;
   rt::Seqlock<LinkReport> report_;
   EventQueue events_;

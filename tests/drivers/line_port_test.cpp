@@ -1,10 +1,14 @@
-// The serial port on a pseudo-terminal: set-up, partial writes, hang-up, reopening by path, exclusive use.
-#include "drivers/serial_port.h"
+// The line on a pseudo-terminal: set-up, partial writes, hang-up, reopening by path, exclusive use; and as a socket:
+// who is answered, and what is no loss.
+#include "drivers/line_port.h"
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <poll.h>
 #include <pty.h>
 #include <sys/ioctl.h>
+#include <sys/socket.h>
 #include <termios.h>
 #include <unistd.h>
 
@@ -64,23 +68,23 @@ bool eventually(Done&& done) {
 
 std::string refusal(std::string_view text) {
   try {
-    SerialEndpoint::parse(text);
+    Endpoint::parse(text);
   } catch (const std::runtime_error& error) {
     return error.what();
   }
   return {};
 }
 
-TEST(SerialEndpoint, Parses) {
-  const auto usb = SerialEndpoint::parse("serial:/dev/ttyUSB0:921600");
+TEST(Endpoint, Parses) {
+  const auto usb = Endpoint::parse("serial:/dev/ttyUSB0:921600");
   EXPECT_EQ(usb.path, "/dev/ttyUSB0");
   EXPECT_EQ(usb.baud, 921600u);
-  const auto by_path = SerialEndpoint::parse("serial:/dev/serial/by-path/pci-0000:00:14.0-usb-0:3:1.0-port0:57600");
+  const auto by_path = Endpoint::parse("serial:/dev/serial/by-path/pci-0000:00:14.0-usb-0:3:1.0-port0:57600");
   EXPECT_EQ(by_path.path, "/dev/serial/by-path/pci-0000:00:14.0-usb-0:3:1.0-port0");
   EXPECT_EQ(by_path.baud, 57600u);
 }
 
-TEST(SerialEndpoint, NamesWhatIsWrong) {
+TEST(Endpoint, NamesWhatIsWrong) {
   EXPECT_NE(refusal("/dev/ttyUSB0").find("/dev/ttyUSB0"), std::string::npos);
   EXPECT_NE(refusal("serial:/dev/ttyUSB0").find("serial:<device>:<baud>"), std::string::npos);
   EXPECT_NE(refusal("serial::921600").find("serial:<device>:<baud>"), std::string::npos);
@@ -89,21 +93,150 @@ TEST(SerialEndpoint, NamesWhatIsWrong) {
   EXPECT_NE(refusal("serial:/dev/ttyUSB0:921601").find("921601"), std::string::npos);
   EXPECT_NE(refusal("serial:/dev/ttyUSB0:0").find("0"), std::string::npos);
   EXPECT_NE(refusal("serial:/dev/ttyUSB0:").find("not a number"), std::string::npos);
+  EXPECT_NE(refusal("udp://127.0.0.1").find("udp://<own address>:<port>"), std::string::npos);
+  EXPECT_NE(refusal("udp://127.0.0.1:0").find("1 to 65535"), std::string::npos);
+  EXPECT_NE(refusal("udp://127.0.0.1:70000").find("70000"), std::string::npos);
+  EXPECT_NE(refusal("tcp://:5760").find("no host"), std::string::npos);
+  EXPECT_NE(refusal("tcp://no.such.host.invalid:5760").find("no.such.host.invalid"), std::string::npos);
 }
 
-TEST(SerialPort, NamesTheDeviceItCannotOpen) {
+TEST(Endpoint, ParsesSockets) {
+  const auto listens = Endpoint::parse("udp://127.0.0.1:14540");
+  EXPECT_EQ(listens.kind, EndpointKind::kUdpListen);
+  EXPECT_EQ(listens.host, 0x7f000001u);
+  EXPECT_EQ(listens.port, 14540);
+  EXPECT_EQ(Endpoint::parse("udp://:14540").host, 0u);
+  EXPECT_EQ(Endpoint::parse("udpout://10.1.2.3:14550").kind, EndpointKind::kUdpSend);
+  EXPECT_EQ(Endpoint::parse("tcp://localhost:5760").kind, EndpointKind::kTcp);
+}
+
+/// A socket of the autopilot's side on the loopback.
+class FarSocket {
+ public:
+  explicit FarSocket(int type) : fd_(::socket(AF_INET, type | SOCK_CLOEXEC, 0)) { bind_to(0); }
+  ~FarSocket() { ::close(fd_); }
+  FarSocket(const FarSocket&) = delete;
+  FarSocket& operator=(const FarSocket&) = delete;
+  [[nodiscard]] int fd() const { return fd_; }
+  [[nodiscard]] std::uint16_t port() const {
+    sockaddr_in a{};
+    socklen_t size = sizeof a;
+    getsockname(fd_, reinterpret_cast<sockaddr*>(&a), &size);
+    return ntohs(a.sin_port);
+  }
+  void send_to(std::uint16_t port, std::string_view text) const {
+    const sockaddr_in a = loopback(port);
+    ASSERT_EQ(::sendto(fd_, text.data(), text.size(), 0, reinterpret_cast<const sockaddr*>(&a), sizeof a),
+              std::ssize(text));
+  }
+  [[nodiscard]] std::string receive() const {
+    std::array<char, 512> text;
+    const ssize_t n = ::recv(fd_, text.data(), text.size(), MSG_DONTWAIT);
+    return n > 0 ? std::string(text.data(), static_cast<std::size_t>(n)) : std::string();
+  }
+
+ private:
+  static sockaddr_in loopback(std::uint16_t port) {
+    sockaddr_in a{};
+    a.sin_family = AF_INET, a.sin_addr.s_addr = htonl(INADDR_LOOPBACK), a.sin_port = htons(port);
+    return a;
+  }
+  void bind_to(std::uint16_t port) const {
+    const sockaddr_in a = loopback(port);
+    ASSERT_EQ(::bind(fd_, reinterpret_cast<const sockaddr*>(&a), sizeof a), 0);
+  }
+  int fd_;
+};
+
+std::uint16_t free_udp_port() { return FarSocket(SOCK_DGRAM).port(); }
+
+std::span<const std::uint8_t> bytes_of(std::string_view text) {
+  return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()};
+}
+
+/// Reads until something comes.
+std::string hear(LinePort& port) {
+  std::array<std::uint8_t, 512> buffer{};
+  std::string heard;
+  eventually([&] {
+    const IoResult got = port.read(buffer);
+    EXPECT_NE(got.status, IoStatus::kGone);
+    heard.assign(buffer.begin(), buffer.begin() + static_cast<std::ptrdiff_t>(got.bytes));
+    return got.bytes > 0;
+  });
+  return heard;
+}
+
+TEST(LinePortUdp, ListensAnswersTheAdoptedPeerAndHearsNobodyElse) {
+  const std::uint16_t own = free_udp_port();
+  LinePort port(Endpoint::parse("udp://127.0.0.1:" + std::to_string(own)));
+  EXPECT_EQ(port.write(bytes_of("early")).status, IoStatus::kWouldBlock) << "there is nobody yet";
+  FarSocket stranger(SOCK_DGRAM), autopilot(SOCK_DGRAM);
+  stranger.send_to(own, "noise");
+  EXPECT_EQ(hear(port), "noise");
+  autopilot.send_to(own, "frame");
+  EXPECT_EQ(hear(port), "frame");
+  port.adopt_peer();
+  EXPECT_EQ(port.write(bytes_of("setpoint")).bytes, 8u);
+  EXPECT_TRUE(eventually([&] { return autopilot.receive() == "setpoint"; }));
+  stranger.send_to(own, "more noise");
+  autopilot.send_to(own, "again");
+  EXPECT_EQ(hear(port), "again");
+  EXPECT_EQ(stranger.receive(), "");
+  port.forget_peer();
+  stranger.send_to(own, "it moved here");
+  EXPECT_EQ(hear(port), "it moved here");
+}
+
+TEST(LinePortUdp, APeerThatIsNotThereIsSilenceAndOneThatComesBackIsHeard) {
+  const std::uint16_t there = free_udp_port();
+  LinePort port(Endpoint::parse("udpout://127.0.0.1:" + std::to_string(there)));
+  std::array<std::uint8_t, 16> buffer{};
+  for (int i = 0; i < 5; ++i) {  // each second write meets the error of the one before
+    EXPECT_NE(port.write(bytes_of("x")).status, IoStatus::kGone);
+    EXPECT_EQ(port.read(buffer).status, IoStatus::kWouldBlock);
+  }
+  EXPECT_FALSE(port.hung_up(POLLERR));
+  EXPECT_EQ(port.pending_output_bytes(), 0);
+  EXPECT_FALSE(port.wait_readable(rt::now() + 5 * kMillisecond)) << "nothing to wake for";
+}
+
+TEST(LinePortTcp, ConnectsCarriesAndNoticesTheEnd) {
+  FarSocket server(SOCK_STREAM);
+  const auto endpoint = Endpoint::parse("tcp://127.0.0.1:" + std::to_string(server.port()));
   try {
-    SerialPort port({"/dev/wasp-no-such-device", 115200});
+    LinePort early(endpoint);
+    FAIL();
+  } catch (const std::runtime_error& error) {
+    EXPECT_NE(std::string(error.what()).find("tcp://127.0.0.1:"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("refused"), std::string::npos) << error.what();
+  }
+  ASSERT_EQ(::listen(server.fd(), 1), 0);
+  LinePort port(endpoint);
+  const int far = ::accept(server.fd(), nullptr, nullptr);
+  ASSERT_GE(far, 0);
+  EXPECT_EQ(port.write(bytes_of("hello")).bytes, 5u);
+  EXPECT_EQ(::send(far, "you", 3, 0), 3);
+  EXPECT_EQ(hear(port), "you");
+  ::close(far);
+  std::array<std::uint8_t, 16> buffer{};
+  EXPECT_TRUE(eventually([&] { return port.read(buffer).status == IoStatus::kGone; }));
+  EXPECT_TRUE(port.try_reopen()) << "the server still listens";
+}
+
+TEST(LinePort, NamesTheDeviceItCannotOpen) {
+  try {
+    LinePort port({"/dev/wasp-no-such-device", 115200});
     FAIL();
   } catch (const std::runtime_error& error) {
     EXPECT_NE(std::string(error.what()).find("/dev/wasp-no-such-device"), std::string::npos);
   }
-  EXPECT_THROW(SerialPort({"/dev/null", 115200}), std::runtime_error);  // not a terminal
+  EXPECT_THROW(LinePort({"/dev/null", 115200}), std::runtime_error);  // not a terminal
 }
 
-TEST(SerialPort, IsRawAndCloseOnExec) {
+TEST(LinePort, IsRawAndCloseOnExec) {
   FarEnd far(own_link());
-  SerialPort port({far.path(), 921600});
+  LinePort port({far.path(), 921600});
   termios line{};
   ASSERT_EQ(tcgetattr(port.fd(), &line), 0);
   EXPECT_EQ(cfgetospeed(&line), static_cast<speed_t>(B921600));
@@ -118,9 +251,9 @@ TEST(SerialPort, IsRawAndCloseOnExec) {
   EXPECT_NE(fcntl(port.fd(), F_GETFL) & O_NONBLOCK, 0);
 }
 
-TEST(SerialPort, CarriesEveryByteValueBothWays) {
+TEST(LinePort, CarriesEveryByteValueBothWays) {
   FarEnd far(own_link());
-  SerialPort port({far.path(), 115200});
+  LinePort port({far.path(), 115200});
   std::array<std::uint8_t, 256> all{};
   for (std::size_t i = 0; i < all.size(); ++i) all[i] = static_cast<std::uint8_t>(i);
 
@@ -148,18 +281,18 @@ TEST(SerialPort, CarriesEveryByteValueBothWays) {
   EXPECT_GE(port.pending_output_bytes(), 0);
 }
 
-TEST(SerialPort, AnEmptyLineIsNotADeadOne) {
+TEST(LinePort, AnEmptyLineIsNotADeadOne) {
   FarEnd far(own_link());
-  SerialPort port({far.path(), 115200});
+  LinePort port({far.path(), 115200});
   std::array<std::uint8_t, 8> buffer{};
   EXPECT_EQ(port.read(buffer).status, IoStatus::kWouldBlock);
   EXPECT_FALSE(port.wait_readable(rt::now() + 2 * kMillisecond));
   EXPECT_FALSE(port.wait_readable(rt::now() - kSecond));
 }
 
-TEST(SerialPort, WakesWhenBytesArrive) {
+TEST(LinePort, WakesWhenBytesArrive) {
   FarEnd far(own_link());
-  SerialPort port({far.path(), 115200});
+  LinePort port({far.path(), 115200});
   std::thread sender([&far] {
     rt::sleep_until(rt::now() + 10 * kMillisecond);
     EXPECT_EQ(::write(far.fd(), "x", 1), 1);
@@ -171,9 +304,9 @@ TEST(SerialPort, WakesWhenBytesArrive) {
 }
 
 /// Nobody reads: the line fills, a write is cut short, then none fits; nothing blocks and no byte is lost or doubled.
-TEST(SerialPort, WritesInPartsWhenTheLineIsFull) {
+TEST(LinePort, WritesInPartsWhenTheLineIsFull) {
   FarEnd far(own_link());
-  SerialPort port({far.path(), 115200});
+  LinePort port({far.path(), 115200});
   std::vector<std::uint8_t> block(3000);
   std::size_t accepted = 0, tries = 0;
   bool cut_short = false;
@@ -202,9 +335,9 @@ TEST(SerialPort, WritesInPartsWhenTheLineIsFull) {
   EXPECT_EQ(port.write(block).status, IoStatus::kOk);
 }
 
-TEST(SerialPort, NoticesHangUpAndComesBackUnderTheSamePath) {
+TEST(LinePort, NoticesHangUpAndComesBackUnderTheSamePath) {
   FarEnd far(own_link());
-  SerialPort port({far.path(), 115200});
+  LinePort port({far.path(), 115200});
   const int fd = port.fd();
   std::array<std::uint8_t, 8> buffer{};
   for (int round = 0; round < 3; ++round) {
@@ -229,11 +362,11 @@ TEST(SerialPort, NoticesHangUpAndComesBackUnderTheSamePath) {
   }
 }
 
-TEST(SerialPort, AGivenLineThatIsLostComesBackFromWhoGaveIt) {
+TEST(LinePort, AGivenLineThatIsLostComesBackFromWhoGaveIt) {
   FarEnd far(own_link());
-  SerialPort giver({far.path(), 115200});
+  LinePort giver({far.path(), 115200});
   const HandoverSockets sockets = make_handover();
-  SerialPort taker({far.path(), 115200}, {dup(giver.fd()), sockets.taker});
+  LinePort taker({far.path(), 115200}, {dup(giver.fd()), sockets.taker});
   std::array<std::uint8_t, 8> buffer{};
   EXPECT_EQ(taker.write(buffer).bytes, buffer.size());
   for (int round = 0; round < 2; ++round) {
@@ -276,21 +409,21 @@ TEST(LineHandover, TheNewestOfSeveralIsTakenAndNoneIsLeaked) {
   ::close(sockets.giver);
 }
 
-TEST(SerialPort, LetsTheDeviceGoOnRelease) {
+TEST(LinePort, LetsTheDeviceGoOnRelease) {
   FarEnd far(own_link());
-  SerialPort port({far.path(), 115200});
-  EXPECT_THROW(SerialPort({far.path(), 115200}), std::runtime_error) << "exclusive use";
+  LinePort port({far.path(), 115200});
+  EXPECT_THROW(LinePort({far.path(), 115200}), std::runtime_error) << "exclusive use";
   port.release();
   EXPECT_EQ(port.write(std::array<std::uint8_t, 1>{1}).status, IoStatus::kGone);
-  { SerialPort other({far.path(), 115200}); }
+  { LinePort other({far.path(), 115200}); }
 }
 
-TEST(SerialPort, StaleInputIsDiscardedOnOpening) {
+TEST(LinePort, StaleInputIsDiscardedOnOpening) {
   FarEnd far(own_link());
   int keeper = ::open(far.path().c_str(), O_RDWR | O_NOCTTY);
   ASSERT_GE(keeper, 0);
   ASSERT_EQ(::write(far.fd(), "old\n", 4), 4);
-  SerialPort port({far.path(), 115200});
+  LinePort port({far.path(), 115200});
   std::array<std::uint8_t, 8> buffer{};
   EXPECT_EQ(port.read(buffer).status, IoStatus::kWouldBlock);
   ::close(keeper);
