@@ -34,6 +34,7 @@ constexpr const char* kUsage =
     "  top      live rates, ages and latencies of a running flight, read-only\n"
     "  record   log a running flight, read-only\n"
     "  report   make report.html of a logged flight\n"
+    "  link     who is on a line, what comes how often, and whether that autopilot can be flown by setpoints\n"
     "  doctor   find out by doing whether this machine can fly real time, and what would change that\n"
     "  eval     run one vision kernel over a folder of recordings\n"
     "  iceoryx  export topics to iceoryx, or import a camera from it\n"

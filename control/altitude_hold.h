@@ -16,6 +16,8 @@ struct AltitudeHoldParams {
   float kd_nspm = 6.f;           ///< [N s/m]
   float max_climb_mps = 0.4f;    ///< slope of the setpoint ramp
   float max_correction_n = 3.f;  ///< limit of the PID output around the weight
+  float climb_kp_1ps = 1.2f;     ///< where a climb rate is asked for in place of thrust: [m/s per m] ...
+  float climb_ki_1ps2 = 0.1f;    ///< ... and [m/s per m s]
 };
 
 struct AltitudeHoldState {
@@ -31,5 +33,10 @@ float hover_thrust(const AltitudeHoldParams& params, float cos_tilt) WASP_REALTI
 /// starts where the vehicle is and ramps to the target. Realtime-safe: yes.
 float altitude_hold_step(const AltitudeHoldParams& params, float target_m, float height_m, float climb_rate_mps,
                          float cos_tilt, float dt_s, AltitudeHoldState& state) WASP_REALTIME;
+
+/// The same for an autopilot that holds climb rates itself: returns the climb rate to ask for [m/s]. The slope of the
+/// ramp is fed forward. Realtime-safe: yes.
+float climb_hold_step(const AltitudeHoldParams& params, float target_m, float height_m, float dt_s,
+                      AltitudeHoldState& state) WASP_REALTIME;
 
 }  // namespace wasp::control

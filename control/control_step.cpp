@@ -47,7 +47,9 @@ Situation assess(const ControlParams& p, const ControlInput& in, bool height_see
       !now.ground_seen && s.ground_seen_at_ns != kNever && in.now_ns - s.ground_seen_at_ns > p.ground_hold_limit_ns;
   now.setpoint_finite = finite;
   now.deadlines_missed = in.deadlines_missed;
-  now.only_watching = s.mission.phase == MissionPhase::kWatch;
+  const bool watching = s.mission.phase == MissionPhase::kWatch;
+  now.taken_away = watching && s.mission.early_end == EarlyEnd::kModeTaken;
+  now.only_watching = watching && !now.taken_away;
   return now;
 }
 
@@ -167,6 +169,49 @@ void forget_holds(FlightMode last_mode, ControlState& s) noexcept {
   if (last_mode == FlightMode::kManual) s.avoid_raised_at_ns = kNever;
 }
 
+/// The altitude hold with the thrust that carries the vehicle as the autopilot says, or as it was learned.
+AltitudeHoldParams altitude_hold_of(const ControlParams& p, const ControlInput& in, const ControlState& s) noexcept {
+  AltitudeHoldParams hold = p.altitude_hold;
+  const float share = in.autopilot.semantics.learn_hover ? s.hover.share : in.autopilot.semantics.hover_share;
+  if (share > 0.f) hold.full_thrust_n = hold.mass_kg * kGravity_mps2 / share;
+  return hold;
+}
+
+void learn_hover(const ControlInput& in, const MissionWish& wish, ControlState& s) noexcept {
+  const AutopilotSemantics& autopilot = in.autopilot.semantics;
+  if (!autopilot.learn_hover) return;
+  constexpr float kClear_m = 0.12f, kWellAbove_m = 0.1f;
+  const float clearance_m = s.height.height_m - s.mission.ground_height_m;
+  HoverShareInput seen{autopilot.hover_share, s.sent.thrust};
+  seen.force_up_mps2 = in.accel_present ? -in.accel_body_mps2[2] : 0.f;
+  seen.airborne = in.autopilot.armed && wish.rotors && clearance_m > kClear_m;
+  seen.asked_up = in.autopilot.armed && wish.rotors && s.mode.mode == FlightMode::kBehaviour &&
+                  s.altitude_hold.engaged && s.altitude_hold.setpoint_m - s.height.height_m > kWellAbove_m;
+  hover_share_step(seen, in.dt_s, s.hover);
+}
+
+/// The thrust field that keeps the height.
+float hovering_field(const ControlParams& p, const ControlInput& in, const ControlState& s) noexcept {
+  if (in.autopilot.semantics.vertical == VerticalChannel::kClimbRate) return climb_field(in.autopilot.semantics, 0.f);
+  return hover_thrust(altitude_hold_of(p, in, s), cos_tilt(in));
+}
+
+/// The thrust field of a gentle descent.
+float sinking_field(const ControlParams& p, const ControlInput& in, const ControlState& s, float cos_tilt) noexcept {
+  if (in.autopilot.semantics.vertical == VerticalChannel::kClimbRate)
+    return climb_field(in.autopilot.semantics, -p.failsafe_sink_mps);
+  return p.failsafe_thrust_share * hover_thrust(altitude_hold_of(p, in, s), cos_tilt);
+}
+
+/// The thrust field that brings the vehicle to the height wanted.
+float height_field(const ControlParams& p, const ControlInput& in, float target_m, ControlState& s) noexcept {
+  if (in.autopilot.semantics.vertical == VerticalChannel::kClimbRate)
+    return climb_field(in.autopilot.semantics,
+                       climb_hold_step(p.altitude_hold, target_m, s.height.height_m, in.dt_s, s.altitude_hold));
+  return altitude_hold_step(altitude_hold_of(p, in, s), target_m, s.height.height_m, s.height.climb_rate_mps,
+                            cos_tilt(in), in.dt_s, s.altitude_hold);
+}
+
 /// What behaviours and mission together want, before limits and mode.
 Setpoint wanted_setpoint(const ControlParams& p, const ControlInput& in, const Intention& intention,
                          const MissionWish& wish, ControlState& s) noexcept {
@@ -184,30 +229,47 @@ Setpoint wanted_setpoint(const ControlParams& p, const ControlInput& in, const I
   wanted.roll_rad = tilt.roll_rad + wish.roll_rad;
   wanted.pitch_rad = wanted_pitch(p, in, intention, wish, tilt.pitch_rad, s);
   wanted.yaw_rate_radps = wanted_yaw_rate(p, in, intention, wish, s);
-  wanted.thrust = altitude_hold_step(p.altitude_hold, target_height(p, intention, wish, in.dt_s, s), s.height.height_m,
-                                     s.height.climb_rate_mps, cos_tilt(in), in.dt_s, s.altitude_hold);
+  wanted.thrust = height_field(p, in, target_height(p, intention, wish, in.dt_s, s), s);
   return wanted;
 }
 
 /// The mode's own word: what goes out instead of, or as, the wanted setpoint.
-Setpoint by_mode(const ControlParams& p, const ControlInput& in, FlightMode mode, const Setpoint& wanted) noexcept {
+Setpoint by_mode(const ControlParams& p, const ControlInput& in, const ControlState& s,
+                 const Setpoint& wanted) noexcept {
   Setpoint neutral;
-  switch (mode) {
+  switch (s.mode.mode) {
     case FlightMode::kBehaviour:
       return wanted;
-    case FlightMode::kHold:
-      neutral.thrust = wanted.thrust;
+    case FlightMode::kHold:  // who holds climb rates holds the height better than our accelerometer alone
+      neutral.thrust =
+          in.autopilot.semantics.vertical == VerticalChannel::kClimbRate ? hovering_field(p, in, s) : wanted.thrust;
       return neutral;
     case FlightMode::kManual:
-      neutral.thrust = hover_thrust(p.altitude_hold, cos_tilt(in));
+      neutral.thrust = hovering_field(p, in, s);
       return neutral;
     case FlightMode::kFailsafe:
-      neutral.thrust = p.failsafe_thrust_share * hover_thrust(p.altitude_hold, cos_tilt(in));
+      neutral.thrust = sinking_field(p, in, s, cos_tilt(in));
       return neutral;
     case FlightMode::kDisarmed:
       break;
   }
   return neutral;
+}
+
+/// The heading of the setpoint: the vehicle's own, or, for an autopilot that is told where to point, the one commanded
+/// so far turned on by the yaw rate. It never runs far ahead of a vehicle that does not follow.
+float heading_of(const ControlInput& in, ControlState& s) noexcept {
+  if (!has_attitude(in)) return s.heading_rad = s.heading_held ? s.heading_before_rad : 0.f;
+  const float yaw_rad = euler_from_quat(attitude_of(in)).yaw_rad;
+  const bool commanded = in.autopilot.semantics.heading_by_angle && in.autopilot.armed && in.autopilot.follows;
+  if (!commanded || !s.heading_held) {
+    s.heading_held = commanded;
+    return s.heading_rad = yaw_rad;
+  }
+  constexpr float kFurthestAhead_rad = 0.5f, kTurn = 2 * std::numbers::pi_v<float>;
+  const float ahead_rad = std::remainder(s.heading_before_rad + s.sent.yaw_rate_radps * in.dt_s - yaw_rad, kTurn);
+  s.heading_rad = yaw_rad + std::clamp(ahead_rad, -kFurthestAhead_rad, kFurthestAhead_rad);
+  return s.heading_rad;
 }
 
 /// Through the limits, from the last setpoint sent, into the command. Whatever is not the behaviours' own is level at
@@ -217,8 +279,7 @@ void put_setpoint(const ControlParams& p, const ControlInput& in, const Setpoint
   s.sent = s.sent_before;
   if (s.mode.mode != FlightMode::kBehaviour) level(s.sent);
   if (!limit(p.limits, chosen, in.dt_s, s.sent)) s.sent = Setpoint{};  // cannot happen: neutral is finite
-  const Quat q = quat_from_euler(
-      {s.sent.roll_rad, s.sent.pitch_rad, has_attitude(in) ? euler_from_quat(attitude_of(in)).yaw_rad : 0.f});
+  const Quat q = quat_from_euler({s.sent.roll_rad, s.sent.pitch_rad, heading_of(in, s)});
   c.q_ned_body = {q.w(), q.x(), q.y(), q.z()};
   c.yaw_rate_radps = s.sent.yaw_rate_radps;
   c.thrust = s.sent.thrust;
@@ -227,7 +288,8 @@ void put_setpoint(const ControlParams& p, const ControlInput& in, const Setpoint
   const bool not_ours = in.autopilot.heard_at_ns == kNever || s.mission.phase == MissionPhase::kBroken ||
                         s.mission.phase == MissionPhase::kWatch;
   const bool stopped = s.mode.mode == FlightMode::kFailsafe && p.failsafe_action == FailsafeAction::kStopStream;
-  c.sent = !not_ours && !stopped;
+  const bool left = s.mode.mode == FlightMode::kManual && in.autopilot.semantics.silent_when_left;
+  c.sent = !not_ours && !stopped && !left;
 }
 
 /// Until when the chosen setpoint may go out: only a flying mode that obeys cues or attitude rests on them.
@@ -251,7 +313,7 @@ void refuse(const ControlParams& p, const ControlInput& in, Refusal refusal, Con
   Setpoint wanted;
   wanted.thrust = out.command.thrust;
   s.mode = {refusal == Refusal::kCueTooOld ? FlightMode::kHold : FlightMode::kFailsafe, ModeReason::kTooOld};
-  put_setpoint(p, in, by_mode(p, in, s.mode.mode, wanted), s, out.command);
+  put_setpoint(p, in, by_mode(p, in, s, wanted), s, out.command);
   out.command.exposed_at_ns = kNever;
   out.command.cue_source = -1;
   out.command.refused = static_cast<std::uint8_t>(refusal);
@@ -262,19 +324,21 @@ ControlOutput control_step(const ControlParams& p, const ControlInput& in, Contr
   forget_holds(s.mode.mode, s);
   const bool height_seen = estimate(p, in, intention, s);
   if (velocity_held(p, in, s)) rest_on_velocity(s, intention);
-  const MissionWish wish =
-      mission_step(p.mission,
-                   {in.now_ns, in.autopilot.armed, in.autopilot.follows, height_seen, s.height.height_m,
-                    s.height.climb_rate_mps, in.stop_requested, in.autopilot.heard_at_ns != kNever, in.may_arm},
-                   s.mission);
+  const MissionWish wish = mission_step(
+      p.mission,
+      {in.now_ns, in.autopilot.armed, in.autopilot.follows, height_seen, s.height.height_m, s.height.climb_rate_mps,
+       in.stop_requested, in.autopilot.heard_at_ns != kNever, in.may_arm, in.autopilot.semantics.silent_when_left},
+      s.mission);
+  learn_hover(in, wish, s);
   const Setpoint wanted = wanted_setpoint(p, in, intention, wish, s);
   s.sent_before = s.sent;
+  s.heading_before_rad = s.heading_rad;
   Setpoint probe = s.sent;
   const bool finite = limit(p.limits, wanted, in.dt_s, probe);
   flight_mode_step(assess(p, in, height_seen, intention.images, s, finite), s.mode);
 
   const bool standing = !wish.rotors && s.mode.mode != FlightMode::kManual;
-  const Setpoint chosen = standing ? Setpoint{} : by_mode(p, in, s.mode.mode, wanted);
+  const Setpoint chosen = standing ? Setpoint{} : by_mode(p, in, s, wanted);
   ControlOutput out;
   Command& c = out.command;
   put_setpoint(p, in, chosen, s, c);
@@ -291,9 +355,11 @@ ControlOutput control_step(const ControlParams& p, const ControlInput& in, Contr
   }
   c.avoid = intention.avoid ? 1 : 0;
   c.mission_phase = static_cast<std::uint8_t>(s.mission.phase);
-  out.ask_arm = wish.armed && !(in.autopilot.armed && in.autopilot.follows) && s.mission.phase == MissionPhase::kArm;
+  const bool arming = wish.armed && s.mission.phase == MissionPhase::kArm;
+  out.ask_follow = arming && !in.autopilot.follows;
+  out.ask_arm = arming && !in.autopilot.armed;
   out.ask_disarm = wish.disarm && in.autopilot.armed;
-  if (wish.rotors) out.neutral_thrust = p.failsafe_thrust_share * hover_thrust(p.altitude_hold, 1.f);
+  if (wish.rotors) out.neutral_thrust = sinking_field(p, in, s, 1.f);
   return out;
 }
 

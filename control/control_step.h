@@ -7,9 +7,11 @@
 #include "control/barometer.h"
 #include "control/flight_mode.h"
 #include "control/height_filter.h"
+#include "control/hover_share.h"
 #include "control/limits.h"
 #include "control/mission.h"
 #include "control/velocity_hold.h"
+#include "types/autopilot_semantics.h"
 #include "types/messages.h"
 #include "types/realtime.h"
 
@@ -35,6 +37,7 @@ struct ControlParams {
   bool hold_heading = false;  ///< while nobody steers, keep the heading of the moment nobody began to
   float min_height_m = 0.3f, max_height_m = 4.f;  ///< where behaviours may climb and sink to
   float failsafe_thrust_share = 0.96f;            ///< of hover thrust: a gentle descent
+  float failsafe_sink_mps = 0.3f;                 ///< the same where a climb rate is asked for
   FailsafeAction failsafe_action = FailsafeAction::kDescend;
 };
 
@@ -43,6 +46,7 @@ struct AutopilotState {
   TimeNs heard_at_ns = kNever;  ///< any valid frame
   bool armed = false;
   bool follows = false;  ///< in the mode in which it obeys setpoints
+  AutopilotSemantics semantics;
 };
 
 struct ControlInput {
@@ -70,6 +74,9 @@ struct ControlState {
   TimeNs avoid_raised_at_ns = kNever, avoid_heard_at_ns = kNever;  ///< its first tick and its latest
   float held_yaw_rad = 0;
   bool holding_yaw = false;
+  HoverShareState hover;
+  float heading_rad = 0, heading_before_rad = 0;  ///< commanded, where the heading is commanded: of this tick, the last
+  bool heading_held = false;
   Setpoint sent, sent_before;  ///< of this tick and of the one before
   ModeState mode;
   MissionState mission;
@@ -79,6 +86,7 @@ struct ControlState {
 /// The command, what to ask of the autopilot besides, and until when the command may go out.
 struct ControlOutput {
   Command command;
+  bool ask_follow = false;  ///< to enter the mode in which it obeys
   bool ask_arm = false, ask_disarm = false;
   float neutral_thrust = 0;  ///< what whoever must speak in our place sends, level: a gentle descent; 0 on the ground
   TimeNs cue_until_ns = kForever;       ///< a cue it rests on reaches its age limit

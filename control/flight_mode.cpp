@@ -15,6 +15,7 @@ constexpr std::array kRows = {
     Row{[](const Situation& s) WASP_REALTIME { return !s.autopilot_armed; }, FlightMode::kDisarmed,
         ModeReason::kMissionStep},
     Row{[](const Situation& s) WASP_REALTIME { return s.only_watching; }, FlightMode::kManual, ModeReason::kRestarted},
+    Row{[](const Situation& s) WASP_REALTIME { return s.taken_away; }, FlightMode::kManual, ModeReason::kAutopilotLeft},
     Row{[](const Situation& s) WASP_REALTIME { return !s.link_alive; }, FlightMode::kFailsafe, ModeReason::kLinkLost},
     Row{[](const Situation& s) WASP_REALTIME { return !s.autopilot_follows; }, FlightMode::kManual,
         ModeReason::kAutopilotLeft},

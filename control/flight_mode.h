@@ -18,6 +18,7 @@ struct Situation {
   bool ground_lost_long = false;  ///< none was for longer than the hold limit
   bool setpoint_finite = true;
   bool deadlines_missed = false;  ///< two consecutive ticks
+  bool taken_away = false;        ///< the autopilot left our mode in flight: the pilot's from here on
   bool only_watching = false;     ///< a flying process started again: it sends nothing
 };
 

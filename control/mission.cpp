@@ -33,6 +33,11 @@ bool standing_long_enough(const MissionParams& p, const MissionInput& in, Missio
   return in.now_ns - s.settled_since_ns >= kLandedFor;
 }
 
+/// Everything of ours is ready, and the rest is up to somebody with a transmitter.
+bool waits_for_pilot(const MissionParams& p, const MissionState& s) noexcept {
+  return s.phase == MissionPhase::kArm && (p.pilot_arms || p.pilot_enters);
+}
+
 MissionWish wait_and_arm(const MissionParams& p, const MissionInput& in, MissionState& s, double in_phase_s) noexcept {
   MissionWish wish;
   const bool ready = in.heard && in.may_arm && (in.ground_seen || p.follow_recording);
@@ -40,7 +45,7 @@ MissionWish wait_and_arm(const MissionParams& p, const MissionInput& in, Mission
     end_early(s, MissionPhase::kBroken, EarlyEnd::kFoundArmed, in.now_ns);  // perhaps in the air: not ours
   } else if (in.stop_requested) {
     end_early(s, in.armed ? MissionPhase::kDisarm : MissionPhase::kDone, EarlyEnd::kStopped, in.now_ns);
-  } else if (in_phase_s > static_cast<double>(p.patience_s)) {
+  } else if (in_phase_s > static_cast<double>(p.patience_s) && !waits_for_pilot(p, s)) {
     end_early(s, MissionPhase::kBroken, EarlyEnd::kNoPatience, in.now_ns);
   } else if (s.phase == MissionPhase::kWait && ready) {
     s.ground_height_m = in.height_m;
@@ -54,14 +59,15 @@ MissionWish wait_and_arm(const MissionParams& p, const MissionInput& in, Mission
   return wish;
 }
 
-/// Started again in flight: whatever the vehicle does now, the autopilot does it. Over once it is disarmed for a
-/// second.
+/// Started again in flight, or the mode taken away: whatever the vehicle does now is not ours. Over once it is disarmed
+/// for a second.
 MissionWish watch(const MissionParams& p, const MissionInput& in, MissionState& s, double in_phase_s) noexcept {
   if (!in.heard || in.armed) s.settled_since_ns = kNever;
   if (in.heard && !in.armed && s.settled_since_ns == kNever) s.settled_since_ns = in.now_ns;
   const bool disarmed = s.settled_since_ns != kNever && in.now_ns - s.settled_since_ns >= kSecond;
   const bool unheard = !in.heard && in_phase_s > static_cast<double>(p.patience_s);
-  if (disarmed || unheard || in.stop_requested) end_early(s, MissionPhase::kBroken, EarlyEnd::kRestarted, in.now_ns);
+  const EarlyEnd why = s.early_end == EarlyEnd::kNone ? EarlyEnd::kRestarted : s.early_end;
+  if (disarmed || unheard || in.stop_requested) end_early(s, MissionPhase::kBroken, why, in.now_ns);
   return {};
 }
 
@@ -77,6 +83,9 @@ void move_sticks(const HoverLeg& leg, double t_s, MissionWish& wish) noexcept {
   wish.roll_rad = wave(leg.tilt_amplitude_rad, kRollPeriods * leg.tilt_period_s);
   wish.target_m += wave(leg.bob_amplitude_m, leg.bob_period_s);
 }
+
+/// Nobody fights for a mode: what the pilot, or a failsafe of the autopilot, took is theirs.
+bool taken_away(const MissionInput& in) noexcept { return in.ends_when_left && in.armed && !in.follows; }
 
 MissionWish fly_leg(const MissionParams& p, const MissionInput& in, MissionState& s, double in_phase_s) noexcept {
   const int leg = leg_of(s.phase);
@@ -97,6 +106,8 @@ MissionWish fly_leg(const MissionParams& p, const MissionInput& in, MissionState
   wish.steer = true;
   if (!in.armed)
     end_early(s, MissionPhase::kBroken, EarlyEnd::kDisarmed, in.now_ns);  // never armed again from here
+  else if (taken_away(in))
+    end_early(s, MissionPhase::kWatch, EarlyEnd::kModeTaken, in.now_ns);
   else if (in.stop_requested)
     end_early(s, p.follow_recording ? MissionPhase::kDisarm : MissionPhase::kLand, EarlyEnd::kStopped, in.now_ns);
   else if (in_phase_s >= length_s && !last)
@@ -121,15 +132,19 @@ MissionWish mission_step(const MissionParams& p, const MissionInput& in, Mission
       wish.armed = wish.rotors = true;
       if (!in.armed)
         enter(s, MissionPhase::kDone, in.now_ns);
+      else if (taken_away(in))
+        end_early(s, MissionPhase::kWatch, EarlyEnd::kModeTaken, in.now_ns);
       else if (standing_long_enough(p, in, s))
         enter(s, MissionPhase::kDisarm, in.now_ns);
       else if (in_phase_s > kLongestLanding_s)
         end_early(s, MissionPhase::kBroken, EarlyEnd::kNoGround, in.now_ns);
       return wish;
     case MissionPhase::kDisarm:
-      wish.disarm = true;
+      wish.disarm = !taken_away(in);
       if (!in.armed)
         enter(s, MissionPhase::kDone, in.now_ns);
+      else if (taken_away(in))
+        end_early(s, MissionPhase::kWatch, EarlyEnd::kModeTaken, in.now_ns);
       else if (in_phase_s > kLongestDisarm_s)
         end_early(s, MissionPhase::kBroken, EarlyEnd::kNotDisarming, in.now_ns);
       return wish;
@@ -158,7 +173,7 @@ const char* name_of(MissionPhase phase) noexcept {
     case MissionPhase::kBroken:
       return "broken off";
     case MissionPhase::kWatch:
-      return "watching only: started again in flight";
+      return "watching only";
     default:
       return "hover";
   }
@@ -172,6 +187,7 @@ const char* name_of(EarlyEnd end) noexcept {
                                  "disarmed in flight",
                                  "no ground found while landing",
                                  "the autopilot did not disarm",
+                                 "the autopilot left our mode: the pilot's, or its own failsafe's, from here on",
                                  "the flying process was started again in flight and only watches"};
   const auto i = static_cast<std::size_t>(end);
   return i < kNames.size() ? kNames[i] : "unknown";

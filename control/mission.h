@@ -25,6 +25,8 @@ struct MissionParams {
   int leg_count = 0;
   std::array<HoverLeg, kMaxLegs> legs{};
   bool never_command = false;     ///< started again in flight: watch until the vehicle is disarmed, send nothing
+  bool pilot_arms = false;        ///< wasp never asks to arm: it waits for the pilot without losing patience
+  bool pilot_enters = false;      ///< likewise for the mode
   bool follow_recording = false;  ///< replay: arm, hold the height the recording shows, no take-off or landing
   float recording_seconds = 0.f;  ///< replay: length of the run
   float landed_margin_m = 0.06f;  ///< this close to the standing height counts as standing
@@ -47,8 +49,9 @@ struct MissionInput {
   bool armed = false, follows = false, ground_seen = false;
   float height_m = 0, climb_rate_mps = 0;
   bool stop_requested = false;
-  bool heard = true;    ///< the autopilot has said whether it is armed
-  bool may_arm = true;  ///< false: something of ours is not as it must be for a flight
+  bool heard = true;            ///< the autopilot has said whether it is armed
+  bool may_arm = true;          ///< false: something of ours is not as it must be for a flight
+  bool ends_when_left = false;  ///< an autopilot that leaves our mode in flight ends the mission
 };
 
 /// Why a mission ended before its end.
@@ -60,6 +63,7 @@ enum class EarlyEnd : std::uint8_t {
   kDisarmed,      ///< disarmed in flight
   kNoGround,      ///< the landing took too long
   kNotDisarming,  ///< the autopilot did not disarm
+  kModeTaken,     ///< the autopilot left our mode in flight: the pilot, or a failsafe of its own
   kRestarted,     ///< the flying process died and was started again: it never commands
 };
 

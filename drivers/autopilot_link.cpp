@@ -88,6 +88,7 @@ TimeNs AutopilotLink::exposed_at(Stream stream, TimeNs remote_ns, TimeNs receive
   TimeNs& last = last_remote_ns_[stream];
   const bool went_back = last >= 0 && remote_ns >= 0 && remote_ns < last - kClockJumpNs;
   last = remote_ns;
+  if (went_back) ++counts_.reboots;
   if (went_back && clock_.synced()) {
     restart_clock();
     ++counts_.clock_restarts;

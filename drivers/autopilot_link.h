@@ -56,6 +56,7 @@ struct LinkCounts {
   std::uint64_t outranked_samples = 0;  ///< a better message carries the same quantity
   std::uint64_t unmapped_times = 0;     ///< stamped with the arrival time: not synced yet, or a time not credible
   std::uint64_t clock_restarts = 0;     ///< the autopilot's clock jumped
+  std::uint64_t reboots = 0;            ///< of those, the times a stream's own time went back: it was started again
   std::uint64_t timesync_accepted = 0, timesync_refused = 0;
 };
 
@@ -129,6 +130,14 @@ class AutopilotLink {
   [[nodiscard]] const ClockMap& clock() const noexcept { return clock_; }
   /// The line was cut and is back: partial frames, open questions and the clock map are void. Counts stay.
   void restart() WASP_REALTIME;
+
+  /// Answers a command addressed to us by name with "not supported", for a sink that serves none, or not this one.
+  template <class Sink>
+  void refuse_command(const mavlink::Frame& frame, Sink& sink) WASP_REALTIME {
+    mavlink::CommandAck answer;
+    if (!unsupported_command(frame, answer)) return;
+    send(answer, sink);
+  }
 
  private:
   enum Stream : std::size_t { kImuStream, kAttitudeStream, kStreams };
@@ -226,14 +235,6 @@ class AutopilotLink {
     m.target_system = frame.system_id;
     m.target_component = frame.component_id;
     send(m, sink);
-  }
-
-  /// Without a sink that serves commands every one addressed to us by name is refused.
-  template <class Sink>
-  void refuse_command(const mavlink::Frame& frame, Sink& sink) WASP_REALTIME {
-    mavlink::CommandAck answer;
-    if (!unsupported_command(frame, answer)) return;
-    send(answer, sink);
   }
 
   template <class Message, class Sink>

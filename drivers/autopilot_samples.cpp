@@ -33,7 +33,7 @@ Finiteness convert_scaled(const Imu& from, ImuSample& to) noexcept {
   to.gyro_body_radps = scaled(kMilli, from.xgyro, from.ygyro, from.zgyro);
   to.mag_body_gauss = scaled(kMilli, from.xmag, from.ymag, from.zmag);
   to.temperature_degc = kCenti * static_cast<float>(from.temperature);
-  to.fields = kFieldAccel | kFieldGyro | kFieldMag | (from.temperature != 0 ? kFieldTemperature : 0u);
+  to.fields = kFieldCoarse | kFieldAccel | kFieldGyro | kFieldMag | (from.temperature != 0 ? kFieldTemperature : 0u);
   return Finiteness::kWhole;
 }
 

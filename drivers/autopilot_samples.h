@@ -19,6 +19,8 @@ enum class Finiteness : std::uint8_t {
 /// Bits of ImuSample::fields (HIGHRES_IMU fields_updated).
 inline constexpr std::uint32_t kFieldAccel = 0x007, kFieldGyro = 0x038, kFieldMag = 0x1C0,
                                kFieldPressure = kImuHasPressure, kFieldTemperature = 0x1000;
+/// Not of HIGHRES_IMU: the numbers are whole mG and mrad/s, so that a sensor at rest may well repeat itself.
+inline constexpr std::uint32_t kFieldCoarse = 0x10000;
 
 Finiteness convert(const mavlink::HighresImu& from, ImuSample& to) WASP_REALTIME;
 /// mG, mrad/s, mgauss (ArduPilot fills RAW_IMU so as well); temperature 0 means none was sent.

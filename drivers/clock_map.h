@@ -32,6 +32,7 @@ class ClockMap {
   static constexpr double kMaxDrift = 500e-6;  ///< crystals are within 100 ppm, resonators within 500 when new
   static constexpr int kSyncedAfter = 3;       ///< accepted exchanges
   static constexpr int kJumpAfter = 3;         ///< outliers that agree
+  static constexpr int kUnsteadyAfter = 8;     ///< outliers in a row that do not
 
   ClockOutcome add(const ClockExchange& exchange) WASP_REALTIME {
     const DurationNs round_trip = exchange.received_at_ns - exchange.sent_at_ns;
@@ -45,7 +46,7 @@ class ClockMap {
     if (accepted_ == 0) return start(middle_ns, offset_ns, ClockOutcome::kAccepted);
     const DurationNs error_ns = offset_ns - offset_at(middle_ns);
     if (std::abs(error_ns) > kOutlierNs) return doubt(middle_ns, offset_ns);
-    doubts_ = 0;
+    doubts_ = outliers_ = 0;
     track(middle_ns, error_ns);
     return ClockOutcome::kAccepted;
   }
@@ -87,12 +88,17 @@ class ClockMap {
     offset_ns_ = offset_ns;
     drift_ = 0;
     accepted_ = 1;
-    doubts_ = 0;
+    doubts_ = outliers_ = 0;
     return outcome;
   }
 
-  /// An outlier: the third in a row that agrees with the first of them is a jump.
+  /// An outlier: the third in a row that agrees with the first of them is a jump. Many that agree with nothing are a
+  /// clock that does not run as ours does (a simulator that is not in real time): what was known of it is void.
   ClockOutcome doubt(TimeNs local_ns, DurationNs offset_ns) noexcept {
+    if (++outliers_ >= kUnsteadyAfter) {
+      restart();
+      return ClockOutcome::kOutlier;
+    }
     if (doubts_ == 0 || std::abs(offset_ns - doubted_offset_ns_) > kOutlierNs) {
       doubts_ = 0;
       doubted_offset_ns_ = offset_ns;
@@ -118,7 +124,7 @@ class ClockMap {
   DurationNs offset_ns_ = 0;
   double drift_ = 0;
   int accepted_ = 0;
-  int doubts_ = 0;
+  int doubts_ = 0, outliers_ = 0;
   DurationNs doubted_offset_ns_ = 0;
 };
 

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstring>
 
+#include "drivers/autopilot_samples.h"
+
 namespace wasp::drivers {
 namespace {
 
@@ -55,7 +57,9 @@ const char* name_of(SampleFault fault) noexcept {
 SampleFault ImuJudge::judge(const ImuSample& s, TimeNs received_at_ns) noexcept {
   const bool same =
       same_bits(s.accel_body_mps2, before_.accel_body_mps2) && same_bits(s.gyro_body_radps, before_.gyro_body_radps);
-  const bool frozen = freeze_.frozen(same, received_at_ns);
+  const bool coarse = (s.fields & kFieldCoarse) != 0;
+  const bool frozen =
+      freeze_.frozen(same, received_at_ns, coarse ? FreezeWatch::kCoarseFrozenFor : FreezeWatch::kFrozenFor);
   before_ = s;
   if (!finite(s.accel_body_mps2) || !finite(s.gyro_body_radps)) return SampleFault::kNotFinite;
   if (!within(s.accel_body_mps2, kMostAccel_mps2) || !within(s.gyro_body_radps, kMostRate_radps))

@@ -23,13 +23,14 @@ const char* name_of(SampleFault fault) WASP_REALTIME;
 class FreezeWatch {
  public:
   static constexpr DurationNs kFrozenFor = 100 * kMillisecond;
+  static constexpr DurationNs kCoarseFrozenFor = 2 * kSecond;  ///< of whole mG and mrad/s, which repeat at rest
   static constexpr int kFrozenSamples = 3;
 
   /// True once the same values were given for kFrozenFor, and kFrozenSamples times after the first.
-  bool frozen(bool same, TimeNs received_at_ns) WASP_REALTIME {
+  bool frozen(bool same, TimeNs received_at_ns, DurationNs for_ns = kFrozenFor) WASP_REALTIME {
     if (!same) repeats_ = 0, since_ns_ = received_at_ns;
     if (same && repeats_ < kFrozenSamples) ++repeats_;
-    return repeats_ >= kFrozenSamples && received_at_ns - since_ns_ >= kFrozenFor;
+    return repeats_ >= kFrozenSamples && received_at_ns - since_ns_ >= for_ns;
   }
 
  private:

@@ -42,15 +42,6 @@ void read_run(TomlTable t, Config& c) {
   t.finish();
 }
 
-void read_autopilot(TomlTable t, Config& c) {
-  t.text_value("endpoint", c.endpoint);
-  t.text_value("flavour", c.flavour, {"wasp"});
-  t.number("system_id", c.system_id, 1, 255);
-  t.number("component_id", c.component_id, 1, 255);
-  t.number("follow_mode", c.follow_mode, 0, 4294967295.0);
-  t.finish();
-}
-
 void read_vector(TomlTable& t, const char* key, std::span<float> out, double low, double high) {
   std::vector<double> numbers;
   t.numbers(key, numbers, low, high);
@@ -117,11 +108,12 @@ std::vector<LegColumn> read_leg_columns(TomlTable& t) {
   return columns;
 }
 
-void read_mission(TomlTable t, control::MissionParams& m) {
+void read_mission(TomlTable t, Config& c) {
+  control::MissionParams& m = c.control.mission;
   std::vector<double> heights, seconds;
   t.numbers("heights_m", heights, 0.3, 20.0);
   t.numbers("seconds", seconds, 1, 36'000);
-  t.number("patience_s", m.patience_s, 1, 600);
+  t.number("patience_s", c.patience_s, 0, 3600);
   t.number("landed_margin_m", m.landed_margin_m, 0.01, 1);
   const auto legs = read_leg_columns(t);
   t.finish();
@@ -131,11 +123,11 @@ void read_mission(TomlTable t, control::MissionParams& m) {
   m.leg_count = static_cast<int>(heights.size());
   for (std::size_t i = 0; i < heights.size(); ++i)
     m.legs[i].height_m = static_cast<float>(heights[i]), m.legs[i].seconds = static_cast<float>(seconds[i]);
-  for (const LegColumn& c : legs) {
-    if (c.values.empty()) continue;
-    if (c.values.size() != heights.size())
-      t.refuse(std::string("mission.") + c.key + " must have as many values as mission.heights_m");
-    for (std::size_t i = 0; i < c.values.size(); ++i) c.set(m.legs[i], static_cast<float>(c.values[i]));
+  for (const LegColumn& leg : legs) {
+    if (leg.values.empty()) continue;
+    if (leg.values.size() != heights.size())
+      t.refuse(std::string("mission.") + leg.key + " must have as many values as mission.heights_m");
+    for (std::size_t i = 0; i < leg.values.size(); ++i) leg.set(m.legs[i], static_cast<float>(leg.values[i]));
   }
 }
 
@@ -166,11 +158,9 @@ void read_control(TomlTable t, Config& c) {
   read_milliseconds(t, "attitude_age_limit_ms", c.control.attitude_age_limit_ns);
   read_milliseconds(t, "link_age_limit_ms", c.control.link_age_limit_ns);
   read_milliseconds(t, "ground_hold_limit_ms", c.control.ground_hold_limit_ns);
-  std::string action = c.control.failsafe_action == control::FailsafeAction::kDescend ? "descend" : "stop_stream";
-  t.text_value("failsafe_action", action, {"descend", "stop_stream"});
-  c.control.failsafe_action =
-      action == "descend" ? control::FailsafeAction::kDescend : control::FailsafeAction::kStopStream;
+  read_choice(t, "failsafe_action", c.failsafe, {"flavour", "descend", "stop_stream"});
   t.number("failsafe_thrust_share", c.control.failsafe_thrust_share, 0.5, 1.0);
+  t.number("failsafe_sink_mps", c.control.failsafe_sink_mps, 0.05, 2);
   read_velocity(t, c.control);
   auto& hold = c.control.altitude_hold;
   t.number("mass_kg", hold.mass_kg, 0.05, 50);
@@ -179,6 +169,8 @@ void read_control(TomlTable t, Config& c) {
   t.number("ki_npms", hold.ki_npms, 0, 1000);
   t.number("kd_nspm", hold.kd_nspm, 0, 1000);
   t.number("max_climb_mps", hold.max_climb_mps, 0.05, 5);
+  t.number("climb_kp_1ps", hold.climb_kp_1ps, 0, 10);
+  t.number("climb_ki_1ps2", hold.climb_ki_1ps2, 0, 10);
   t.number("max_correction_n", hold.max_correction_n, 0.1, 1000);
   double tilt_deg = to_degrees(Radians{static_cast<double>(c.control.limits.max_tilt_rad)}).value;
   t.number("max_tilt_deg", tilt_deg, 1, 45);
@@ -219,18 +211,32 @@ void read_threads(TomlTable threads, Config& c) {
   threads.finish();
 }
 
+/// What follows from the flavour where nothing else is said. Other autopilots take their time: an estimator that
+/// settles, a satellite receiver that finds its place.
+void settle(Config& c) {
+  constexpr float kPatience_s = 20, kPatienceWithOthers_s = 120;
+  const bool own = c.autopilot.flavour == drivers::Flavour::kWasp;
+  control::MissionParams& m = c.control.mission;
+  m.patience_s = c.patience_s > 0 ? c.patience_s : own ? kPatience_s : kPatienceWithOthers_s;
+  m.pilot_arms = !c.autopilot.arm;
+  m.pilot_enters = !c.autopilot.enter_mode;
+  const bool descends = c.failsafe == FailsafeChoice::kByFlavour ? own : c.failsafe == FailsafeChoice::kDescend;
+  c.control.failsafe_action = descends ? control::FailsafeAction::kDescend : control::FailsafeAction::kStopStream;
+}
+
 /// `foreign_behaviours`: sections of behaviours this program does not have are passed over.
 void read_document(TomlTable root, Config& c, bool foreign_behaviours) {
   read_run(root.table("run"), c);
-  read_autopilot(root.table("autopilot"), c);
+  read_autopilot(root.table("autopilot"), c.autopilot);
   read_camera(root.table("camera"), c);
   read_camera_down(root.table("camera_down"), c.camera_down);
-  read_mission(root.table("mission"), c.control.mission);
+  read_mission(root.table("mission"), c);
   read_control(root.table("control"), c);
   read_threads(root.table("threads"), c);
   read_guardian(root.table("guardian"), c.guardian);
   read_behaviours(root.table("behaviour"), c, foreign_behaviours);
   root.finish();
+  settle(c);
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include "control/control_step.h"
 #include "rt/periodic.h"
 #include "rt/thread.h"
+#include "scheduling/autopilot_config.h"
 #include "scheduling/guard_config.h"
 #include "scheduling/toml_table.h"
 #include "types/camera.h"
@@ -33,6 +34,9 @@ struct DownCameraConfig {
   CameraGeometry geometry;
 };
 
+/// What happens without fresh evidence; by flavour: wasp descends, the stream to another autopilot stops.
+enum class FailsafeChoice : std::uint8_t { kByFlavour, kDescend, kStopStream };
+
 /// What the admission test does with a thread table that cannot keep its deadlines.
 enum class AdmissionMode : std::uint8_t { kEnforce, kWarn, kOff };
 
@@ -48,10 +52,7 @@ struct Config {
   std::string tracefs;  ///< where tracefs is mounted; empty: the usual places
   bool trace_switches = true;
 
-  std::string endpoint = "serial:/dev/ttyUSB0:921600";
-  std::string flavour = "wasp";
-  int system_id = 1, component_id = 191;
-  int follow_mode = 1;
+  AutopilotConfig autopilot;
 
   std::string camera_driver = "sim";
   CameraGeometry camera;
@@ -63,6 +64,8 @@ struct Config {
   DurationNs control_period_ns = 50 * kMillisecond;
   DurationNs control_deadline_ns = 10 * kMillisecond;
   control::ControlParams control;
+  FailsafeChoice failsafe = FailsafeChoice::kByFlavour;  ///< control.failsafe_action follows from it
+  float patience_s = 0;                                  ///< as configured; control.mission.patience_s follows from it
 
   GuardConfig guardian;  ///< checked here, obeyed by `wasp guard`
 

@@ -54,6 +54,8 @@ void ControlLoop::tick(const rt::Release& release, LoopControl& control) WASP_RE
   input.dt_s = static_cast<float>(to_seconds(config_.control_period_ns * static_cast<DurationNs>(1 + release.skipped)));
   input.stop_requested = control.stop_requested.load(std::memory_order_relaxed);
   input.deadlines_missed = consecutive_misses_ >= kMissesBeforeHold;
+  LinkReport report;
+  if (wiring_.link->load(report)) setup_bar_ = report.setup_bar;
   const char* const bar = bar_to_arming(input.now_ns);
   input.may_arm = bar == nullptr;
   gather(input);
@@ -151,7 +153,8 @@ void ControlLoop::gather(control::ControlInput& input) WASP_REALTIME {
   LinkReport report;
   if (wiring_.link->load(report))
     input.autopilot = {report.heard_at_ns, report.armed != 0,
-                       static_cast<int>(report.custom_mode) == config_.follow_mode};
+                       drivers::main_mode_of(config_.autopilot.flavour, report.custom_mode) == config_.autopilot.mode(),
+                       report.semantics};
 }
 
 /// Mean specific force and pressure of the samples that came since the last tick; bounded by the ring's length.
@@ -172,8 +175,9 @@ void ControlLoop::mean_inertial(control::ControlInput& input) WASP_REALTIME {
 
 std::size_t ControlLoop::encode(const Command& command, TimeNs now_ns) WASP_REALTIME {
   if (command.sent == 0) return 0;
-  return wiring_.autopilot->encode_attitude_target({command.q_ned_body, true, command.yaw_rate_radps, command.thrust},
-                                                   now_ns, out_);
+  const bool by_rate = config_.autopilot.flavour != drivers::Flavour::kArduPilot;
+  return wiring_.autopilot->encode_attitude_target(
+      {command.q_ned_body, by_rate, command.yaw_rate_radps, command.thrust}, now_ns, out_);
 }
 
 /// The last look at the clock: what has grown too old since the arbiter looked is replaced. Returns the bytes used.
@@ -200,12 +204,16 @@ void ControlLoop::send(const control::ControlInput& input, control::ControlOutpu
   used = refuse_if_too_old(input, output, used, control);
   const std::size_t setpoint_bytes = used;
   used = append_heartbeat(command, control.status->incarnation.load(std::memory_order_relaxed), used);
-  used = append_requests(output, used, command.computed_at_ns);
+  used = append_requests(input, output, used, command.computed_at_ns);
   if (used == 0 || !line_is_ours()) return;
   const SetpointLine::Sent sent = line_.send(std::span<const std::uint8_t>(out_.data(), used), setpoint_bytes);
   if (sent.flushed) control.status->setpoints_flushed.fetch_add(1, std::memory_order_relaxed);
   if (!sent.setpoint_whole) heartbeat_due_ns_ = 0;  // it did not go out either
   if (command.sent != 0 && sent.setpoint_whole) command.written_at_ns = rt::now();
+  if (command.written_at_ns == 0)
+    streaming_since_ns_ = kNever;
+  else if (streaming_since_ns_ == kNever)
+    streaming_since_ns_ = command.written_at_ns;
 }
 
 /// Once a second, and at once when what it says of us has changed: behind the setpoint in the same write. Returns the
@@ -219,16 +227,26 @@ std::size_t ControlLoop::append_heartbeat(const Command& command, std::uint32_t 
   return used + wiring_.autopilot->encode_heartbeat(state, std::span<std::uint8_t>(out_).subspan(used));
 }
 
-/// Arming and disarming: behind the setpoint in the same write. Returns the bytes used.
-std::size_t ControlLoop::append_requests(const control::ControlOutput& output, std::size_t used,
-                                         TimeNs now_ns) WASP_REALTIME {
+/// Some autopilots refuse the mode until setpoints have come for a while.
+bool ControlLoop::may_enter_mode(TimeNs now_ns) const WASP_REALTIME {
+  const DurationNs first_ns = drivers::facts_of(config_.autopilot.flavour).stream_first_ns;
+  return first_ns == 0 || (streaming_since_ns_ != kNever && now_ns - streaming_since_ns_ >= first_ns);
+}
+
+/// Mode, arming and disarming: behind the setpoint in the same write. Returns the bytes used.
+std::size_t ControlLoop::append_requests(const control::ControlInput& input, const control::ControlOutput& output,
+                                         std::size_t used, TimeNs now_ns) WASP_REALTIME {
   const auto rest = [&] { return std::span<std::uint8_t>(out_).subspan(used); };
   drivers::AutopilotLink& link = *wiring_.autopilot;
-  if ((output.ask_arm || output.ask_disarm) && now_ns >= request_due_ns_) {
-    if (output.ask_arm) used += link.encode_set_mode(static_cast<std::uint32_t>(config_.follow_mode), 0, 0, rest());
-    used += link.encode_arm(output.ask_arm, 0, rest());
-    request_due_ns_ = now_ns + kRequestPeriod;
-  }
+  const bool in_turn = drivers::facts_of(config_.autopilot.flavour).asks_in_turn;
+  const bool enter = in_turn ? output.ask_follow : output.ask_follow || output.ask_arm;
+  const bool arm = output.ask_arm && (!in_turn || input.autopilot.follows);
+  const bool ask_mode = enter && config_.autopilot.enter_mode && may_enter_mode(now_ns);
+  const bool ask_arm = arm && config_.autopilot.arm;
+  if ((!ask_mode && !ask_arm && !output.ask_disarm) || now_ns < request_due_ns_) return used;
+  if (ask_mode) used += link.encode_set_mode(config_.autopilot.mode(), 0, 0, rest());
+  if (ask_arm || output.ask_disarm) used += link.encode_arm(ask_arm, 0, rest());
+  request_due_ns_ = now_ns + (in_turn ? 2 * kRequestPeriod : kRequestPeriod);
   return used;
 }
 
@@ -305,6 +323,7 @@ const char* ControlLoop::bar_to_arming(TimeNs now_ns) WASP_REALTIME {
   if (now_ns < punctual_from_ns_) return "control missed its deadlines";
   if (wiring_.watch->stolen.load(std::memory_order_relaxed) != 0)
     return "control does not run as the thread table says";
+  if (setup_bar_ != drivers::SetupBar::kNone) return drivers::name_of(setup_bar_);
   return nullptr;
 }
 

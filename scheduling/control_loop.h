@@ -8,6 +8,7 @@
 
 #include "control/control_step.h"
 #include "drivers/autopilot_link.h"
+#include "drivers/autopilot_setup.h"
 #include "drivers/line_port.h"
 #include "rt/periodic.h"
 #include "rt/seqlock.h"
@@ -25,6 +26,8 @@ struct LinkReport {
   TimeNs heard_at_ns = kNever;
   std::uint32_t armed = 0;
   std::uint32_t custom_mode = 0;
+  drivers::SetupBar setup_bar = drivers::SetupBar::kNone;  ///< why it must not be armed
+  AutopilotSemantics semantics;
 };
 
 /// A stall in the middle of a tick, between what the arbiter said and the write: for tests and for fault points. Null
@@ -72,7 +75,9 @@ class ControlLoop {
                                 LoopControl& control) WASP_REALTIME;
   void send(const control::ControlInput& input, control::ControlOutput& output, LoopControl& control) WASP_REALTIME;
   std::size_t append_heartbeat(const Command& command, std::uint32_t incarnation, std::size_t used) WASP_REALTIME;
-  std::size_t append_requests(const control::ControlOutput& output, std::size_t used, TimeNs now_ns) WASP_REALTIME;
+  std::size_t append_requests(const control::ControlInput& input, const control::ControlOutput& output,
+                              std::size_t used, TimeNs now_ns) WASP_REALTIME;
+  [[nodiscard]] bool may_enter_mode(TimeNs now_ns) const WASP_REALTIME;
   void account(const control::ControlInput& input, const Command& command, std::uint64_t skipped,
                LoopControl& control) WASP_REALTIME;
   void account_cues(const control::ControlInput& input, const Command& command, RunStatus& status) WASP_REALTIME;
@@ -97,11 +102,13 @@ class ControlLoop {
   std::array<std::uint8_t, 1024> out_{};
   std::array<TimeNs, control::kMaxBehaviours> last_exposed_{};
   TimeNs heartbeat_due_ns_ = 0, request_due_ns_ = 0;
-  drivers::CompanionState told_;  ///< in the last heartbeat
+  TimeNs streaming_since_ns_ = kNever;  ///< setpoints have gone out at every tick
+  drivers::CompanionState told_;        ///< in the last heartbeat
   int consecutive_misses_ = 0;
   TimeNs punctual_from_ns_ = 0;  ///< two misses in a row bar arming until then
   FlightMode announced_mode_ = FlightMode::kDisarmed;
   ModeReason announced_reason_ = ModeReason::kNone;
+  drivers::SetupBar setup_bar_ = drivers::SetupBar::kNone;
   const char* announced_bar_ = nullptr;
   std::uint8_t announced_phase_ = 255;
   control::EarlyEnd announced_end_ = control::EarlyEnd::kNone;

@@ -45,13 +45,6 @@ sigset_t block_signals() {
   return set;
 }
 
-drivers::LinkIdentity identity_of(const Config& config) {
-  drivers::LinkIdentity id;
-  id.system_id = id.autopilot_system_id = static_cast<std::uint8_t>(config.system_id);
-  id.component_id = static_cast<std::uint8_t>(config.component_id);
-  return id;
-}
-
 BehaviourRings rings_of(const BehaviourTable& table, const Config& config) {
   BehaviourRings rings{names_of(table), {}, flow_topics(table, config)};
   for (const auto& row : config.behaviours)
@@ -80,7 +73,7 @@ std::optional<GuardPage> adopt_guard(const FlightOptions& options) {
 
 /// The serial line: the guardian's, or opened here.
 drivers::LinePort open_line(const FlightOptions& options, const Config& config) {
-  const auto endpoint = drivers::Endpoint::parse(config.endpoint);
+  const auto endpoint = drivers::Endpoint::parse(config.autopilot.endpoint);
   return options.guarded ? drivers::LinePort(endpoint, {kLineDescriptor, kLineSocketDescriptor})
                          : drivers::LinePort(endpoint);
 }
@@ -98,7 +91,7 @@ class Flight {
         flight_files_{flight_.name()},
         stages_(stage_table(flight_)),
         port_(open_line(options, config_)),
-        autopilot_(identity_of(config_)) {
+        autopilot_(config_.autopilot.identity()) {
     control_.status = &run_status(flight_);
     control_.status->preempt_rt = rt::kernel_is_preempt_rt() ? 1 : 0;
     control_.status->incarnation = incarnation();
@@ -226,7 +219,8 @@ class Flight {
     for (std::size_t i = 0; i < table_.size(); ++i)
       control.behaviour_watches.push_back(config_.behaviours[i].enabled ? wire_behaviour(i) : nullptr);
     link_ = std::make_unique<LinkLoop>(flight_, port_, autopilot_, stages_, report_, link_events_,
-                                       add_watch(config_.link_thread));
+                                       add_watch(config_.link_thread),
+                                       config_.autopilot.wish(config_.control.limits.max_tilt_rad));
     control.watch = &add_watch(config_.control_thread);
     control.guard = guard_ ? &guard_->block() : nullptr;
     if (faults_) control.hook = control_fault_hook(control_);

@@ -10,10 +10,7 @@ namespace {
 
 void read_plan(TomlTable root, GuardPlan& plan) {
   read_guardian(root.table("guardian"), plan.guard);
-  TomlTable autopilot = root.table("autopilot");
-  autopilot.text_value("endpoint", plan.endpoint);
-  autopilot.number("system_id", plan.system_id, 1, 255);
-  autopilot.number("component_id", plan.component_id, 1, 255);
+  read_autopilot(root.table("autopilot"), plan.autopilot);
   double rate_hz = static_cast<double>(kSecond) / static_cast<double>(plan.guard.times.period_ns);
   root.table("control").number("rate_hz", rate_hz, 5, 200);
   plan.guard.times.period_ns = static_cast<DurationNs>(static_cast<double>(kSecond) / rate_hz);

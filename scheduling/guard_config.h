@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "scheduling/autopilot_config.h"
 #include "scheduling/guard_policy.h"
 #include "scheduling/toml_table.h"
 
@@ -21,8 +22,7 @@ struct GuardConfig {
 /// Everything the guardian needs to know, read before the flight's own, strict reading.
 struct GuardPlan {
   GuardConfig guard;
-  std::string endpoint;
-  int system_id = 1, component_id = 191;
+  AutopilotConfig autopilot;
 };
 
 /// Takes the keys of [guardian]; throws ConfigError.

@@ -51,13 +51,6 @@ void rise(const GuardConfig& config) {
   if (const std::string why = rt::lock_memory(64 * 1024); !why.empty()) say("memory not locked: " + why);
 }
 
-drivers::LinkIdentity identity_of(const GuardPlan& plan) {
-  drivers::LinkIdentity id;
-  id.system_id = id.autopilot_system_id = static_cast<std::uint8_t>(plan.system_id);
-  id.component_id = static_cast<std::uint8_t>(plan.component_id);
-  return id;
-}
-
 }  // namespace
 
 Guardian::Guardian(GuardPlan plan, std::vector<std::string> command, bool real_time)
@@ -65,10 +58,10 @@ Guardian::Guardian(GuardPlan plan, std::vector<std::string> command, bool real_t
       command_(std::move(command)),
       real_time_(real_time),
       signals_fd_(open_signals()),
-      port_(drivers::Endpoint::parse(plan_.endpoint)),
+      port_(drivers::Endpoint::parse(plan_.autopilot.endpoint)),
       watchdog_(plan_.guard.watchdog),
       page_(GuardPage::create()),
-      voice_(identity_of(plan_)) {
+      voice_(plan_.autopilot.identity()) {
   sched_getaffinity(0, sizeof cores_, &cores_);
   if (!plan_.guard.neutral) plan_.guard.times.neutral_ns = 0;
   if (!real_time) {  // ordinary threads are late by the host's leave: patience for tens of milliseconds
@@ -196,7 +189,9 @@ void Guardian::speak(TimeNs now_ns) {
   }
   if (plan_.guard.times.neutral_ns > 0) {
     const Quat q = quat_from_euler({0.f, 0.f, block.yaw_rad.load()});
-    const drivers::AttitudeTargetCommand neutral{{q.w(), q.x(), q.y(), q.z()}, true, 0.f, block.neutral_thrust.load()};
+    const bool by_rate = drivers::semantics_of(plan_.autopilot.wish(0.f)).heading_rate_used;
+    const drivers::AttitudeTargetCommand neutral{
+        {q.w(), q.x(), q.y(), q.z()}, by_rate, 0.f, block.neutral_thrust.load()};
     used += voice_.encode_attitude_target(neutral, now_ns, std::span<std::uint8_t>(out).subspan(used));
     block.setpoints.fetch_add(1);
     ++spoken_;

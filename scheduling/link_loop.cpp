@@ -13,6 +13,7 @@ constexpr DurationNs kReopenPeriod = 50 * kMillisecond;
 constexpr int kRoomForReply_bytes = 1024;  // pending output below which an answer may go out
 constexpr int kReadsPerWake = 8;
 constexpr DurationNs kQuiet = 1 * kSecond;            // after it a refusal is news again
+constexpr DurationNs kRefusalNews = 10 * kSecond;     // the same refusal of a command is said again after it
 constexpr DurationNs kStranger = 300 * kMillisecond;  // others speak, the autopilot does not: say so
 constexpr DurationNs kStrangerPeriod = 10 * kSecond;
 constexpr DurationNs kMovedAfter = 2 * kSecond;  // a datagram peer so long silent may come back from another port
@@ -20,7 +21,8 @@ constexpr DurationNs kAutopilotBeat = 200 * kMillisecond;
 }  // namespace
 
 LinkLoop::LinkLoop(const shm::Region& flight, drivers::LinePort& port, drivers::AutopilotLink& autopilot,
-                   StageTable& stages, rt::Seqlock<LinkReport>& report, EventQueue& events, ThreadWatch& watch)
+                   StageTable& stages, rt::Seqlock<LinkReport>& report, EventQueue& events, ThreadWatch& watch,
+                   const drivers::SetupWish& wish)
     : port_(port),
       autopilot_(autopilot),
       imu_(flight, shm::kImu, "Imu"),
@@ -29,7 +31,8 @@ LinkLoop::LinkLoop(const shm::Region& flight, drivers::LinePort& port, drivers::
       compute_(stages.add("link", "compute", watch.budget_ns)),
       report_(report),
       events_(events),
-      watch_(watch) {}
+      watch_(watch),
+      setup_(wish, autopilot.identity()) {}
 
 void LinkLoop::run(LoopControl& control) {
   RealtimeLoop loop(control, watch_);
@@ -45,6 +48,7 @@ void LinkLoop::run(LoopControl& control) {
 
 void LinkLoop::serve(LoopControl& control) WASP_REALTIME {
   ask_for_time(rt::now());
+  set_up(rt::now(), *control.status);
   if (rt::now() > peer_until_ns_) port_.forget_peer();
   if (!port_.wait_readable(rt::now() + kPatience)) return;
   const TimeNs woken_ns = rt::now();
@@ -86,10 +90,12 @@ void LinkLoop::watch_the_other_side(RunStatus& status) WASP_REALTIME {
   const drivers::LinkCounts& now = autopilot_.counts();
   status.samples_refused.store(implausible_ + now.refused_samples, std::memory_order_relaxed);
   if (now.refused_samples != seen_.refused_samples) tell(drivers::SampleFault::kNotFinite, "sample refused: ", driver_);
-  if (now.clock_restarts != seen_.clock_restarts) {
+  if (now.clock_restarts != seen_.clock_restarts && received_at_ns_ >= clock_due_ns_) {
     events_.say(received_at_ns_, "the autopilot's clock began anew: it was started again, or its time was set");
-    beats_asked_ = false;
+    clock_due_ns_ = received_at_ns_ + kQuiet;
   }
+  if (now.clock_restarts != seen_.clock_restarts) beats_asked_ = false;
+  if (now.reboots != seen_.reboots) setup_.restart();
   const bool silent = !heard_ && received_at_ns_ - std::max(now_.heard_at_ns, opened_at_ns_) > kStranger;
   if (now.foreign_systems != seen_.foreign_systems && silent && received_at_ns_ >= stranger_due_ns_) {
     events_.say(received_at_ns_, "the autopilot is silent, but another system speaks: [autopilot] system_id?");
@@ -111,6 +117,20 @@ bool LinkLoop::usable(drivers::SampleFault fault, std::string_view head, Told& t
   ++implausible_;
   tell(fault, head, told);
   return false;
+}
+
+/// Asks the autopilot what it is and what it needs, and tells control and the log.
+void LinkLoop::set_up(TimeNs now_ns, RunStatus& status) WASP_REALTIME {
+  std::array<std::uint8_t, mavlink::kMaxFrame> out;
+  if (const std::size_t n = setup_.next_question(now_ns, autopilot_, out); n != 0)
+    reply(std::span<const std::uint8_t>(out.data(), n));
+  drivers::TextLine line;
+  bool verdict = false;
+  if (setup_.take_news(line, verdict)) events_.say(now_ns, line.view());
+  for (std::size_t i = 0; verdict && i + 1 < status.autopilot.size(); ++i)
+    status.autopilot[i].store(i < line.view().size() ? line.view()[i] : '\0', std::memory_order_relaxed);
+  now_.setup_bar = setup_.bar();
+  now_.semantics = setup_.semantics();
 }
 
 /// Its mode and arming are to be known within half a second; by itself it says them once a second.
@@ -155,23 +175,33 @@ void LinkLoop::on_attitude(const AttitudeSample& received) WASP_REALTIME {
   if (!faults_.pass(sample, received_at_ns_)) return;
   if (!usable(attitude_judge_.judge(sample, received_at_ns_), "attitude refused: ", attitude_told_)) return;
   attitude_.write(sample, received_at_ns_);
+  setup_.on_attitude(received_at_ns_);
 }
 
 void LinkLoop::on_heartbeat(const drivers::AutopilotStatus& status) WASP_REALTIME {
   heartbeat_seen_ = heard_ = true;
   now_.armed = status.armed ? 1 : 0;
   now_.custom_mode = status.custom_mode;
+  setup_.on_heartbeat(status);
+}
+
+void LinkLoop::on_frame(const mavlink::Frame& frame) WASP_REALTIME {
+  if (setup_.on_frame(frame)) return;
+  autopilot_.refuse_command(frame, *this);
 }
 
 void LinkLoop::on_ack(std::uint16_t command, std::uint8_t result) WASP_REALTIME {
   using namespace mavlink;  // NOLINT: its enumerations
   if (result == mav_result::kAccepted || result == mav_result::kInProgress) return;
+  const bool news = command != refused_command_ || result != refused_result_ || received_at_ns_ >= refused_until_ns_;
+  if (!news) return;
+  refused_command_ = command, refused_result_ = result, refused_until_ns_ = received_at_ns_ + kRefusalNews;
   if (result == mav_result::kTemporarilyRejected)
     return events_.say(received_at_ns_, "autopilot not yet ready for command ", static_cast<long>(command));
   const std::string_view what =
       command == mav_cmd::kComponentArmDisarm   ? "autopilot refuses to arm or disarm, MAV_RESULT "
       : command == mav_cmd::kDoSetMode          ? "autopilot refuses our mode, MAV_RESULT "
-      : command == mav_cmd::kSetMessageInterval ? "autopilot keeps its own rate of heartbeats, MAV_RESULT "
+      : command == mav_cmd::kSetMessageInterval ? "autopilot keeps its own rate of a message, MAV_RESULT "
                                                 : "autopilot refuses a command, MAV_RESULT ";
   events_.say(received_at_ns_, what, static_cast<long>(result));
 }

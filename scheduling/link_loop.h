@@ -4,6 +4,7 @@
 #pragma once
 
 #include "drivers/autopilot_link.h"
+#include "drivers/autopilot_setup.h"
 #include "drivers/line_port.h"
 #include "drivers/sample_judge.h"
 #include "rt/seqlock.h"
@@ -18,7 +19,8 @@ namespace wasp::scheduling {
 class LinkLoop {
  public:
   LinkLoop(const shm::Region& flight, drivers::LinePort& port, drivers::AutopilotLink& autopilot, StageTable& stages,
-           rt::Seqlock<LinkReport>& report, EventQueue& events, ThreadWatch& watch);
+           rt::Seqlock<LinkReport>& report, EventQueue& events, ThreadWatch& watch,
+           const drivers::SetupWish& wish = {});
   /// Runs until the stop flag. Real-time loop.
   void run(LoopControl& control);
 
@@ -28,6 +30,7 @@ class LinkLoop {
   void on_heartbeat(const drivers::AutopilotStatus& status) WASP_REALTIME;
   void on_ack(std::uint16_t command, std::uint8_t result) WASP_REALTIME;
   void on_statustext(std::uint8_t severity, std::string_view text) WASP_REALTIME;
+  void on_frame(const mavlink::Frame& frame) WASP_REALTIME;
   void reply(std::span<const std::uint8_t> bytes) WASP_REALTIME;
 
  private:
@@ -44,6 +47,7 @@ class LinkLoop {
   void tell(drivers::SampleFault fault, std::string_view head, Told& told) WASP_REALTIME;
   void watch_the_other_side(RunStatus& status) WASP_REALTIME;
   void ask_for_beats() WASP_REALTIME;
+  void set_up(TimeNs now_ns, RunStatus& status) WASP_REALTIME;
 
   drivers::LinePort& port_;
   drivers::AutopilotLink& autopilot_;
@@ -52,6 +56,7 @@ class LinkLoop {
   rt::Seqlock<LinkReport>& report_;
   EventQueue& events_;
   ThreadWatch& watch_;
+  drivers::AutopilotSetup setup_;
   SampleFaults faults_;
   LinkReport now_;
   TimeNs received_at_ns_ = 0, timesync_due_ns_ = 0, peer_until_ns_ = 0;
@@ -63,8 +68,11 @@ class LinkLoop {
   Told imu_told_, attitude_told_, driver_;
   std::uint64_t implausible_ = 0;  ///< samples refused here
   drivers::LinkCounts seen_;       ///< of the driver, at the last look
-  TimeNs opened_at_ns_ = 0, stranger_due_ns_ = 0;
+  TimeNs opened_at_ns_ = 0, stranger_due_ns_ = 0, clock_due_ns_ = 0;
   bool beats_asked_ = false;
+  std::uint16_t refused_command_ = 0;  ///< what was last said of an acknowledgement, and until when it is no news
+  std::uint8_t refused_result_ = 0;
+  TimeNs refused_until_ns_ = 0;
   std::array<std::uint8_t, 4096> buffer_{};
 };
 

@@ -101,6 +101,7 @@ struct RunStatus {
   std::atomic<std::uint64_t> samples_refused{0};    ///< of the autopilot: not finite, implausible, frozen
   std::atomic<std::uint64_t> schedule_thefts{0};    ///< times a thread was found with another policy, priority or core
   std::atomic<std::uint64_t> pages_lost{0};         ///< of shared memory whose file was cut short
+  std::array<std::atomic<char>, 128> autopilot{};   ///< what the check before arming found, a line of text
 };
 
 }  // namespace wasp::scheduling

@@ -11,7 +11,7 @@ constexpr std::uint8_t kSystem = 1, kComponent = 1;
 constexpr std::uint64_t kTicksPerSecond = 200;
 constexpr std::size_t kMaxQueued = 64 * 1024;
 constexpr std::uint16_t kCommandSetMode = 176, kCommandReboot = 246, kCommandArm = 400, kCommandFailure = 420,
-                        kCommandInterval = 511, kCommandClockStep = 31010;
+                        kCommandInterval = 511, kCommandRequestMessage = 512, kCommandClockStep = 31010;
 constexpr float kForce = 21196.f, kForceReboot = 20190226.f;
 constexpr DurationNs kRebootTime = 1500 * kMillisecond;
 constexpr std::uint8_t kIgnoreYawRate = 4, kIgnoreThrust = 64, kIgnoreAttitude = 128;
@@ -22,8 +22,17 @@ bool for_us(std::uint8_t system, std::uint8_t component) {
 
 }  // namespace
 
-bool setpoint_of(const mavlink::SetAttitudeTarget& target, AttitudeSetpoint& setpoint) {
+std::uint32_t custom_mode_of(const AutopilotKind& kind, ControllerMode mode) {
+  constexpr std::uint32_t kPx4[] = {1u << 16, 6u << 16, 4u << 16 | 6u << 24};  // MANUAL, OFFBOARD, AUTO LAND
+  constexpr std::uint32_t kCopter[] = {0, 20, 9};                              // STABILIZE, GUIDED_NOGPS, LAND
+  const auto i = static_cast<std::uint32_t>(mode);
+  return kind.flavour == Flavour::kPx4 ? kPx4[i] : kind.flavour == Flavour::kArduPilot ? kCopter[i] : i;
+}
+
+bool setpoint_of(const mavlink::SetAttitudeTarget& target, Flavour flavour, AttitudeSetpoint& setpoint) {
   if ((target.type_mask & (kIgnoreThrust | kIgnoreAttitude)) != 0) return false;
+  const unsigned rates = target.type_mask & 7u;
+  if (flavour == Flavour::kArduPilot && rates != 0 && rates != 7) return false;  // "The body rates are ill-defined"
   const Quat q(target.q[0], target.q[1], target.q[2], target.q[3]);
   const float norm = q.norm();
   const bool by_rate = (target.type_mask & kIgnoreYawRate) == 0;
@@ -33,15 +42,26 @@ bool setpoint_of(const mavlink::SetAttitudeTarget& target, AttitudeSetpoint& set
   constexpr float kMaxTilt_rad = 0.6f;
   setpoint.euler.roll_rad = std::clamp(setpoint.euler.roll_rad, -kMaxTilt_rad, kMaxTilt_rad);
   setpoint.euler.pitch_rad = std::clamp(setpoint.euler.pitch_rad, -kMaxTilt_rad, kMaxTilt_rad);
-  setpoint.yaw_by_rate = by_rate;
+  setpoint.yaw_by_rate = by_rate && flavour == Flavour::kWasp;  // the others turn to the heading of the quaternion
   setpoint.yaw_rate_radps = by_rate ? target.body_yaw_rate : 0.f;
   setpoint.thrust = std::clamp(target.thrust, 0.f, 1.f);
   return true;
 }
 
 AutopilotLink::AutopilotLink(FlightController& flight, DurationNs clock_offset_ns)
-    : flight_(flight), clock_offset_ns_(clock_offset_ns) {
+    : flight_(flight), clock_offset_ns_(clock_offset_ns), parameters_(flight.kind().flavour) {
   output_.reserve(kMaxQueued);
+  apply_parameters();
+  if (is(Flavour::kPx4)) imu_every_ = 4;
+  if (is(Flavour::kArduPilot)) imu_every_ = 100, attitude_every_ = 50;  // 2 Hz and 4 Hz until asked
+}
+
+void AutopilotLink::apply_parameters() {
+  if (is(Flavour::kPx4)) flight_.set_timeout(from_seconds(parameters_.value("COM_OF_LOSS_T", 1)));
+  if (!is(Flavour::kArduPilot)) return;
+  const auto options = static_cast<unsigned>(parameters_.value("GUID_OPTIONS", 0));
+  flight_.set_climb_rate((options & 8u) == 0, static_cast<float>(parameters_.value("WPNAV_SPEED_UP", 250) / 100),
+                         static_cast<float>(parameters_.value("WPNAV_SPEED_DN", 150) / 100));
 }
 
 template <class Message>
@@ -66,6 +86,8 @@ void AutopilotLink::handle(const mavlink::Frame& frame, TimeNs now_ns) {
   ++frames_received_;
   if (frame.is<mavlink::CommandLong>()) on_command(frame.as<mavlink::CommandLong>(), frame, now_ns);
   if (frame.is<mavlink::SetAttitudeTarget>()) on_setpoint(frame.as<mavlink::SetAttitudeTarget>(), now_ns);
+  if (frame.is<mavlink::ParamRequestRead>()) on_parameter_read(frame.as<mavlink::ParamRequestRead>());
+  if (frame.is<mavlink::ParamSet>()) on_parameter_set(frame.as<mavlink::ParamSet>());
   if (frame.is<mavlink::Timesync>()) on_timesync(frame.as<mavlink::Timesync>(), frame, now_ns);
 }
 
@@ -73,10 +95,10 @@ CommandResult AutopilotLink::obey(const mavlink::CommandLong& command, TimeNs no
   switch (command.command) {
     case kCommandArm:
       return flight_.arm(command.param1 > 0.5f, command.param2 == kForce);
-    case kCommandSetMode: {
-      const bool known = command.param1 >= 1 && command.param2 >= 0 && command.param2 < 256;  // NaN fails
-      return known ? flight_.set_mode(static_cast<std::uint32_t>(command.param2)) : CommandResult::kDenied;
-    }
+    case kCommandSetMode:
+      return command.param1 >= 1 ? set_mode(command.param2) : CommandResult::kDenied;
+    case kCommandRequestMessage:
+      return command.param1 == float{mavlink::AutopilotVersion::kId} ? send_version(now_ns) : CommandResult::kDenied;
     case kCommandReboot:
       return reboot(command, now_ns);
     case kCommandFailure:
@@ -85,21 +107,85 @@ CommandResult AutopilotLink::obey(const mavlink::CommandLong& command, TimeNs no
       if (!(std::abs(command.param1) <= 1e9f)) return CommandResult::kDenied;
       clock_offset_ns_ += from_seconds(static_cast<double>(command.param1));
       return CommandResult::kAccepted;
-    case kCommandInterval: {
-      const bool possible = command.param1 == float{mavlink::Heartbeat::kId} && command.param2 >= 5000.f &&
-                            command.param2 <= 1e6f;  // of 200 ticks a second
-      if (possible) beat_every_ = static_cast<std::uint64_t>(command.param2 / 5000.f);
-      return possible ? CommandResult::kAccepted : CommandResult::kDenied;
-    }
+    case kCommandInterval:
+      return set_interval(command);
     default:
       return CommandResult::kUnsupported;
   }
+}
+
+CommandResult AutopilotLink::set_mode(float main_mode) {
+  const AutopilotKind& kind = flight_.kind();
+  for (const auto mode : {ControllerMode::kManual, ControllerMode::kOffboard, ControllerMode::kLand}) {
+    if (kind.flavour == Flavour::kWasp && mode == ControllerMode::kLand) continue;
+    const std::uint32_t number = drivers::main_mode_of(kind.flavour, custom_mode_of(kind, mode));
+    if (main_mode == static_cast<float>(number)) return flight_.set_mode(mode);
+  }
+  return main_mode >= 0 && main_mode < 256 ? CommandResult::kUnsupported : CommandResult::kDenied;  // NaN: denied
+}
+
+CommandResult AutopilotLink::set_interval(const mavlink::CommandLong& command) {
+  const bool possible = command.param2 >= 5000.f && command.param2 <= 1e6f;  // of 200 ticks a second
+  const auto ticks = possible ? static_cast<std::uint64_t>(command.param2 / 5000.f) : 0;
+  if (!possible) return CommandResult::kDenied;
+  const auto id = static_cast<std::uint32_t>(command.param1);
+  if (id == mavlink::Heartbeat::kId)
+    beat_every_ = ticks;
+  else if (is(Flavour::kPx4) ? id == mavlink::HighresImu::kId : is(Flavour::kArduPilot) && id == mavlink::RawImu::kId)
+    imu_every_ = ticks;
+  else if (is(Flavour::kPx4) ? id == mavlink::AttitudeQuaternion::kId
+                             : is(Flavour::kArduPilot) && id == mavlink::Attitude::kId)
+    attitude_every_ = ticks;
+  else
+    return CommandResult::kDenied;
+  return CommandResult::kAccepted;
+}
+
+CommandResult AutopilotLink::send_version(TimeNs) {
+  if (is(Flavour::kWasp)) return CommandResult::kUnsupported;
+  mavlink::AutopilotVersion m;
+  constexpr std::uint64_t kBoth = 64 | 8192;  // SET_ATTITUDE_TARGET, MAVLink 2
+  m.capabilities = kBoth | drivers::capability_of(drivers::facts_of(flight_.kind().flavour).encoding);
+  m.flight_sw_version = is(Flavour::kPx4) ? 0x010e00ffu : 0x040500ffu;
+  send(m);
+  return CommandResult::kAccepted;
+}
+
+void AutopilotLink::send_parameter(const SimParameter& row) {
+  const auto value = drivers::encode_parameter(drivers::facts_of(flight_.kind().flavour).encoding, row.type, row.value);
+  mavlink::ParamValue m;
+  m.param_value = value.value_or(0.f);
+  m.param_count = static_cast<std::uint16_t>(parameters_.size());
+  m.param_index = static_cast<std::uint16_t>(parameters_.index_of(row));
+  m.param_id = drivers::parameter_name(row.name);
+  m.param_type = row.type;
+  send(m);
+}
+
+/// Silence for a name it does not have.
+void AutopilotLink::on_parameter_read(const mavlink::ParamRequestRead& request) {
+  if (!for_us(request.target_system, request.target_component)) return;
+  if (const SimParameter* row = parameters_.find(drivers::name_of(request.param_id))) send_parameter(*row);
+}
+
+void AutopilotLink::on_parameter_set(const mavlink::ParamSet& request) {
+  const SimParameter* row = parameters_.find(drivers::name_of(request.param_id));
+  if (row == nullptr || !for_us(request.target_system, request.target_component)) return;
+  const auto encoding = drivers::facts_of(flight_.kind().flavour).encoding;
+  if (const auto value = drivers::decode_parameter(encoding, request.param_type, request.param_value))
+    parameters_.set(row->name, *value);
+  apply_parameters();
+  send_parameter(*row);
 }
 
 CommandResult AutopilotLink::reboot(const mavlink::CommandLong& command, TimeNs now_ns) {
   if (command.param1 != 1.f) return CommandResult::kUnsupported;
   if (flight_.armed() && command.param6 != kForceReboot) return CommandResult::kDenied;
   flight_.restart();
+  apply_parameters();
+  beat_every_ = kTicksPerSecond;
+  imu_every_ = is(Flavour::kArduPilot) ? 100 : is(Flavour::kPx4) ? 4 : 1;  // what was asked of it is forgotten
+  attitude_every_ = is(Flavour::kArduPilot) ? 50 : 2;
   failures_ = SensorFailures();
   clock_offset_ns_ = -now_ns;
   ticks_ = 0;  // a heartbeat first
@@ -117,13 +203,18 @@ void AutopilotLink::on_command(const mavlink::CommandLong& command, const mavlin
   ack.target_component = frame.component_id;
   send(ack);
   if (now_ns < silent_until_ns_) return;
+  if (!is(Flavour::kWasp) && command.command == kCommandArm && result == CommandResult::kTemporarilyRejected)
+    send_text(flight_.settled() ? "PreArm: not on the ground" : "PreArm: attitude estimate not settled", 4);
   send_heartbeat();  // the new state at once, not within a second
 }
 
 void AutopilotLink::on_setpoint(const mavlink::SetAttitudeTarget& target, TimeNs now_ns) {
   AttitudeSetpoint setpoint;
-  if (for_us(target.target_system, target.target_component) && setpoint_of(target, setpoint))
+  if (!for_us(target.target_system, target.target_component)) return;
+  if (setpoint_of(target, flight_.kind().flavour, setpoint))
     flight_.set_setpoint(setpoint, now_ns);
+  else
+    ++setpoints_dropped_;
 }
 
 void AutopilotLink::on_timesync(const mavlink::Timesync& sync, const mavlink::Frame& frame, TimeNs now_ns) {
@@ -134,17 +225,20 @@ void AutopilotLink::on_timesync(const mavlink::Timesync& sync, const mavlink::Fr
   mavlink::Timesync reply{};
   reply.tc1 = own_time(now_ns);
   reply.ts1 = sync.ts1;
-  reply.target_system = frame.system_id;
-  reply.target_component = frame.component_id;
+  if (!is(Flavour::kArduPilot)) {  // whose answers are addressed to nobody
+    reply.target_system = frame.system_id;
+    reply.target_component = frame.component_id;
+  }
   send(reply);
 }
 
 void AutopilotLink::step(const ImuSample& imu, TimeNs now_ns) {
   if (now_ns < silent_until_ns_) return;
-  send_imu(imu, now_ns);
-  if (ticks_ % 2 == 0) send_attitude(now_ns);
+  if (ticks_ % imu_every_ == 0) send_imu(imu, now_ns);
+  if (ticks_ % attitude_every_ == 0) send_attitude(now_ns);
   if (ticks_ % beat_every_ == 0) send_heartbeat();
-  if (ticks_ % kTicksPerSecond == kTicksPerSecond / 2) {
+  const std::uint64_t asks_every = is(Flavour::kPx4) ? kTicksPerSecond / 10 : kTicksPerSecond;
+  if (ticks_ % asks_every == asks_every / 2) {
     mavlink::Timesync request{};
     request.ts1 = own_time(now_ns);
     send(request);
@@ -159,9 +253,9 @@ void AutopilotLink::step(const ImuSample& imu, TimeNs now_ns) {
 void AutopilotLink::send_heartbeat() {
   mavlink::Heartbeat m{};
   const bool offboard = flight_.mode() == ControllerMode::kOffboard;
-  m.custom_mode = static_cast<std::uint32_t>(flight_.mode());
-  m.type = 2;       // quadrotor
-  m.autopilot = 0;  // generic
+  m.custom_mode = custom_mode_of(flight_.kind(), flight_.mode());
+  m.type = 2;  // quadrotor
+  m.autopilot = flight_.kind().mav_autopilot;
   m.base_mode = static_cast<std::uint8_t>(1 | (offboard ? 8 : 64) | (flight_.armed() ? 128 : 0));
   m.system_status = flight_.descending() ? 5 : flight_.armed() ? 4 : 3;
   m.mavlink_version = 3;
@@ -169,6 +263,12 @@ void AutopilotLink::send_heartbeat() {
 }
 
 void AutopilotLink::send_attitude(TimeNs now_ns) {
+  if (is(Flavour::kArduPilot)) {
+    const Euler e = flight_.euler();
+    const Vec3 rates = flight_.rate_body_radps();
+    return send(mavlink::Attitude{static_cast<std::uint32_t>(own_time(now_ns) / kMillisecond), e.roll_rad, e.pitch_rad,
+                                  e.yaw_rad, rates.x(), rates.y(), rates.z()});
+  }
   mavlink::AttitudeQuaternion m{};
   const Quat q = quat_from_euler(flight_.euler());
   const Vec3 rate = flight_.rate_body_radps();
@@ -179,6 +279,16 @@ void AutopilotLink::send_attitude(TimeNs now_ns) {
 }
 
 void AutopilotLink::send_imu(const ImuSample& imu, TimeNs now_ns) {
+  if (is(Flavour::kArduPilot)) {
+    const auto whole = [](float value) { return static_cast<std::int16_t>(std::lround(value)); };
+    const auto &a = imu.accel_body_mps2, &g = imu.gyro_body_radps;
+    constexpr float kMilliG = 1000.f / 9.80665f;
+    mavlink::RawImu m;
+    m.time_usec = static_cast<std::uint64_t>(own_time(now_ns) / kMicrosecond);
+    m.xacc = whole(a[0] * kMilliG), m.yacc = whole(a[1] * kMilliG), m.zacc = whole(a[2] * kMilliG);
+    m.xgyro = whole(g[0] * 1000), m.ygyro = whole(g[1] * 1000), m.zgyro = whole(g[2] * 1000);
+    return send(m);
+  }
   mavlink::HighresImu m{};
   m.time_usec = static_cast<std::uint64_t>(own_time(now_ns) / kMicrosecond);
   m.xacc = imu.accel_body_mps2[0], m.yacc = imu.accel_body_mps2[1], m.zacc = imu.accel_body_mps2[2];

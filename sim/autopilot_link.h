@@ -13,6 +13,7 @@
 
 #include "messages/mavlink_frame.h"
 #include "messages/mavlink_messages.h"
+#include "sim/autopilot_parameters.h"
 #include "sim/flight_controller.h"
 #include "sim/sensor_failures.h"
 
@@ -20,7 +21,7 @@ namespace wasp::sim {
 
 class AutopilotLink {
  public:
-  /// `clock_offset_ns`: autopilot time minus simulation time.
+  /// `clock_offset_ns`: autopilot time minus simulation time. Its kind is the flight controller's.
   AutopilotLink(FlightController& flight, DurationNs clock_offset_ns);
 
   /// Bytes from the companion, in any pieces.
@@ -34,6 +35,10 @@ class AutopilotLink {
 
   /// Companion clock minus autopilot clock from the last answered TIMESYNC [ns]; 0 before.
   [[nodiscard]] DurationNs companion_offset_ns() const { return companion_offset_ns_; }
+  [[nodiscard]] AutopilotParameters& parameters() { return parameters_; }
+  /// What parameters say of the flight is obeyed from here on.
+  void apply_parameters();
+  [[nodiscard]] std::uint64_t setpoints_dropped() const { return setpoints_dropped_; }
   [[nodiscard]] std::uint64_t frames_received() const { return frames_received_; }
 
  private:
@@ -42,6 +47,13 @@ class AutopilotLink {
   CommandResult obey(const mavlink::CommandLong& command, TimeNs now_ns);
   CommandResult reboot(const mavlink::CommandLong& command, TimeNs now_ns);
   void on_setpoint(const mavlink::SetAttitudeTarget& target, TimeNs now_ns);
+  CommandResult set_mode(float main_mode);
+  CommandResult set_interval(const mavlink::CommandLong& command);
+  CommandResult send_version(TimeNs now_ns);
+  void on_parameter_read(const mavlink::ParamRequestRead& request);
+  void on_parameter_set(const mavlink::ParamSet& request);
+  void send_parameter(const SimParameter& row);
+  [[nodiscard]] bool is(Flavour flavour) const { return flight_.kind().flavour == flavour; }
   void on_timesync(const mavlink::Timesync& sync, const mavlink::Frame& frame, TimeNs now_ns);
   void send_heartbeat();
   void send_attitude(TimeNs now_ns);
@@ -58,12 +70,16 @@ class AutopilotLink {
   SensorFailures failures_;
   TimeNs silent_until_ns_ = kNever;  ///< starting again
   std::vector<std::uint8_t> output_;
-  std::uint64_t ticks_ = 0, frames_received_ = 0;
-  std::uint64_t beat_every_ = 200;  ///< ticks
+  AutopilotParameters parameters_;
+  std::uint64_t ticks_ = 0, frames_received_ = 0, setpoints_dropped_ = 0;
+  std::uint64_t beat_every_ = 200, imu_every_ = 1, attitude_every_ = 2;  ///< ticks
 };
+
+/// HEARTBEAT.custom_mode of a mode.
+std::uint32_t custom_mode_of(const AutopilotKind& kind, ControllerMode mode);
 
 /// Setpoint of a SET_ATTITUDE_TARGET; false when it must be ignored (masked attitude or thrust, numbers not finite, a
 /// quaternion that is none).
-bool setpoint_of(const mavlink::SetAttitudeTarget& target, AttitudeSetpoint& setpoint);
+bool setpoint_of(const mavlink::SetAttitudeTarget& target, Flavour flavour, AttitudeSetpoint& setpoint);
 
 }  // namespace wasp::sim

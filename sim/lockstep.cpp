@@ -191,9 +191,10 @@ void Lockstep::send(const control::ControlOutput& output, TimeNs now_ns) {
   const auto give = [&](std::size_t n) { simulator_.from_companion(std::span<const std::uint8_t>(out.data(), n)); };
   const Command& c = output.command;
   if (c.sent != 0) give(link_.encode_attitude_target({c.q_ned_body, true, c.yaw_rate_radps, c.thrust}, now_ns, out));
-  if ((output.ask_arm || output.ask_disarm) && now_ns >= request_due_ns_) {
-    if (output.ask_arm) give(link_.encode_set_mode(kFollowMode, 0, 0, out));
-    give(link_.encode_arm(output.ask_arm, 0, out));
+  const bool ask_arm = output.ask_arm || output.ask_follow;
+  if ((ask_arm || output.ask_disarm) && now_ns >= request_due_ns_) {
+    if (ask_arm) give(link_.encode_set_mode(kFollowMode, 0, 0, out));
+    give(link_.encode_arm(ask_arm, 0, out));
     request_due_ns_ = now_ns + 500 * kMillisecond;
   }
 }

@@ -8,25 +8,23 @@
 #include <string>
 #include <vector>
 
-#include "types/time.h"
+#include "sim/companion_line.h"
 
 namespace wasp::sim {
 
-class Pty {
+class Pty : public CompanionLine {
  public:
   /// Throws std::runtime_error naming the path and the reason. An old symbolic link at `link_path` is replaced,
   /// anything else there is not touched.
   explicit Pty(std::string link_path);
-  ~Pty();  ///< removes the link
+  ~Pty() override;  ///< removes the link
   Pty(const Pty&) = delete;
   Pty& operator=(const Pty&) = delete;
 
-  /// Sleeps until bytes arrive or `until_ns` (CLOCK_MONOTONIC); true if there are bytes.
-  bool wait(TimeNs until_ns);
-  /// What has arrived, possibly nothing.
-  std::span<const std::uint8_t> read();
+  bool wait(TimeNs until_ns) override;
+  std::span<const std::uint8_t> read() override;
   /// Sends `bytes`, or drops all of them while earlier ones still wait. Split messages never reach the line.
-  void write(std::span<const std::uint8_t> bytes);
+  void write(std::span<const std::uint8_t> bytes) override;
 
   /// To poll.
   [[nodiscard]] int fd() const { return master_; }

@@ -164,6 +164,8 @@ std::vector<Row> make_rows() {
   std::vector<Row> rows{
       row<std::uint32_t>("run", "seed", 0, 4294967295.0, [](D& d) -> std::uint32_t& { return d.config.seed; }),
       row<bool>("run", "safety_pilot", 0, 1, [](D& d) -> bool& { return d.config.safety_pilot; }),
+      word_row("autopilot", "flavour", {"wasp", "px4", "ardupilot"},
+               [](D& d, std::size_t i) { d.config.flavour = static_cast<drivers::Flavour>(i); }),
       row<double>("run", "clock_offset_s", 0, 1e6, [](D& d) -> double& { return d.config.clock_offset_s; }),
       row<double>("imu", "gyro_noise_radps", 0, 1, [](D& d) -> double& { return d.config.imu.gyro_noise_radps; }),
       row<double>("imu", "gyro_bias_radps", 0, 1, [](D& d) -> double& { return d.config.imu.gyro_bias_radps; }),

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "drivers/autopilot_flavour.h"
 #include "sim/imu_model.h"
 #include "sim/optics.h"
 #include "sim/safety_pilot.h"
@@ -28,10 +29,12 @@ struct SimConfig {
   std::uint32_t seed = 1;
   bool safety_pilot = true;
   PilotParams pilot;
-  double clock_offset_s = 1000.25;  ///< autopilot clock minus the simulator's, 0 ... 1e6
-  double camera_rate_hz = 30;       ///< 1 ... 120
-  CameraGeometry camera;            ///< the front one
-  OpticsParams optics;              ///< of the front camera
+  double clock_offset_s = 1000.25;                     ///< autopilot clock minus the simulator's, 0 ... 1e6
+  drivers::Flavour flavour = drivers::Flavour::kWasp;  ///< whose autopilot it behaves as
+  std::vector<std::string> autopilot_parameters;       ///< "NAME=VALUE", over those from the factory
+  double camera_rate_hz = 30;                          ///< 1 ... 120
+  CameraGeometry camera;                               ///< the front one
+  OpticsParams optics;                                 ///< of the front camera
   DownCamera down;
   VehicleParams vehicle;
   WindParams wind;

@@ -14,7 +14,9 @@
 #include "shm/topics.h"
 #include "sim/camera_part.h"
 #include "sim/owned_region.h"
+#include "sim/pty.h"
 #include "sim/truth_feed.h"
+#include "sim/udp_line.h"
 #include "sim/vehicle_loop.h"
 
 namespace {
@@ -23,7 +25,8 @@ using namespace wasp;
 using namespace wasp::sim;
 
 struct Options {
-  std::string instance = "wasp", tty_link, config_path, world_kind, world_file;
+  std::string instance = "wasp", tty_link, udp, config_path, world_kind, world_file, autopilot;
+  std::vector<std::string> parameters;
   std::optional<std::uint32_t> seed;
   std::optional<double> rate_hz;
   bool no_camera = false, camera_only = false, no_safety_pilot = false;
@@ -34,6 +37,13 @@ void declare(CLI::App& app, Options& o) {
   app.add_option("--instance", o.instance, "name of the shared memory regions: wasp.NAME.camera, wasp.NAME.truth")
       ->capture_default_str();
   app.add_option("--tty-link", o.tty_link, "symbolic link to make to the autopilot's serial line");
+  app.add_option("--udp", o.udp,
+                 "in place of a serial line: speak from a port of its own to HOST:PORT, where the companion listens "
+                 "(udp://HOST:PORT there)")
+      ->excludes("--tty-link");
+  app.add_option("--autopilot", o.autopilot, "whose autopilot to behave as (default: autopilot.flavour)")
+      ->check(CLI::IsMember({"wasp", "px4", "ardupilot"}));
+  app.add_option("--param", o.parameters, "NAME=VALUE: a parameter of the autopilot (px4, ardupilot); may be repeated");
   app.add_option("--config", o.config_path, "TOML file; see share/wasp/config/sim.toml for every key");
   app.add_option("--world", o.world_file, "VRML97 file to fly in (`wasp world make`); default: world.kind")
       ->check(CLI::ExistingFile);
@@ -67,6 +77,9 @@ SimConfig settings(const Options& o) {
   if (o.seed) config.seed = *o.seed;
   if (o.rate_hz) config.camera_rate_hz = *o.rate_hz;
   if (o.no_safety_pilot) config.safety_pilot = false;
+  for (std::size_t i = 0; i < drivers::kFlavours.size(); ++i)
+    if (drivers::kFlavours[i].name == o.autopilot) config.flavour = static_cast<Flavour>(i);
+  config.autopilot_parameters = o.parameters;
   return config;
 }
 
@@ -111,22 +124,27 @@ void run_camera(const Options& options, const sigset_t& signals) {
   std::printf("wasp-sim: %s\n", camera.summary().c_str());
 }
 
+std::unique_ptr<CompanionLine> open_line(const Options& options) {
+  if (!options.udp.empty()) return std::make_unique<UdpLine>(options.udp);
+  return std::make_unique<Pty>(options.tty_link);
+}
+
 void run(const Options& options, const sigset_t& signals) {
   const SimConfig config = settings(options);
   std::optional<CameraPart> camera;
   if (!options.no_camera) camera.emplace(config, options.instance);
   const shm::TopicSpec truth_topic{shm::kTruth, "Truth", shm::TopicKind::kRing, shm::kTruthSlots, sizeof(Truth)};
   const OwnedRegion truth(shm::truth_region(options.instance), {&truth_topic, 1});
-  Pty pty(options.tty_link);
+  const std::unique_ptr<CompanionLine> line = open_line(options);
 
   const TimeNs start_ns = rt::now() + 10 * kMillisecond;
   auto poses = std::make_unique<PoseQueue>();
-  VehicleLoop vehicle_loop(config, start_ns, pty, truth.region, *poses);
+  VehicleLoop vehicle_loop(config, start_ns, *line, truth.region, *poses);
   std::atomic<bool> stop{false};
   rt::Thread vehicle_thread = start_vehicle([&] { vehicle_loop.run(stop); });
   if (camera) camera->start(start_ns, *poses, stop);
-  std::printf("wasp-sim: instance %s, serial line %s -> %s\n", options.instance.c_str(), options.tty_link.c_str(),
-              pty.slave_path().c_str());
+  std::printf("wasp-sim: instance %s, autopilot on %s\n", options.instance.c_str(),
+              options.udp.empty() ? options.tty_link.c_str() : options.udp.c_str());
   std::fflush(stdout);
   wait_for_end(signals, options.seconds);
   stop.store(true);
@@ -153,7 +171,7 @@ int main(int argc, char** argv) {
     if (options.camera_only) {
       run_camera(options, signals);
     } else {
-      if (options.tty_link.empty()) throw std::runtime_error("--tty-link is required");
+      if (options.tty_link.empty() && options.udp.empty()) throw std::runtime_error("--tty-link or --udp is required");
       run(options, signals);
     }
   } catch (const std::exception& error) {

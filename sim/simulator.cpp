@@ -17,11 +17,13 @@ Simulator::Simulator(const SimConfig& config, TimeNs start_ns)
       vehicle_(config.vehicle),
       wind_(config.wind, mix(config.seed, 2)),
       imu_(config.imu, mix(config.seed, 1)),
-      flight_(config.vehicle),
+      flight_(config.vehicle, kind_of(config.flavour)),
       link_(flight_, from_seconds(config.clock_offset_s)),
       pilot_(config.safety_pilot && !config.stand.turntable, config.pilot),
       start_ns_(start_ns),
       now_ns_(start_ns) {
+  for (const auto& assignment : config.autopilot_parameters) link_.parameters().set(assignment);
+  link_.apply_parameters();
   if (stand_.turntable) physics_step();
 }
 

@@ -5,11 +5,11 @@
 
 namespace wasp::sim {
 
-VehicleLoop::VehicleLoop(const SimConfig& config, TimeNs start_ns, Pty& pty, const shm::Region& truth_region,
+VehicleLoop::VehicleLoop(const SimConfig& config, TimeNs start_ns, CompanionLine& line, const shm::Region& truth_region,
                          PoseQueue& poses)
     : simulator_(config, start_ns),
       next_ns_(start_ns + kControlPeriod_ns),
-      pty_(pty),
+      line_(line),
       truth_(truth_region, shm::kTruth, "Truth"),
       poses_(poses) {
   output_.reserve(64 * 1024);
@@ -19,7 +19,7 @@ void VehicleLoop::run(const std::atomic<bool>& stop) {
   while (!stop.load(std::memory_order_relaxed)) {
     while (next_ns_ <= rt::now()) tick();
     speak();
-    if (pty_.wait(next_ns_)) hear();
+    if (line_.wait(next_ns_)) hear();
   }
 }
 
@@ -32,14 +32,14 @@ void VehicleLoop::tick() {
 }
 
 void VehicleLoop::hear() {
-  simulator_.from_companion(pty_.read(), rt::now());
+  simulator_.from_companion(line_.read(), rt::now());
   speak();
 }
 
 void VehicleLoop::speak() {
   output_.clear();
   simulator_.drain(output_);
-  pty_.write(output_);
+  line_.write(output_);
 }
 
 }  // namespace wasp::sim

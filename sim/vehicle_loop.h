@@ -1,5 +1,5 @@
-// The vehicle in real time: the simulator driven along CLOCK_MONOTONIC in ticks of 5 ms on an absolute grid, the serial
-// line served as bytes arrive, truth published at 200 Hz. After a stall it catches up tick by tick.
+// The vehicle in real time: the simulator driven along CLOCK_MONOTONIC in ticks of 5 ms on an absolute grid, the line
+// served as bytes arrive, truth published at 200 Hz. After a stall it catches up tick by tick.
 #pragma once
 
 #include <atomic>
@@ -7,8 +7,8 @@
 
 #include "rt/spsc_queue.h"
 #include "shm/broadcast_ring.h"
+#include "sim/companion_line.h"
 #include "sim/pose.h"
-#include "sim/pty.h"
 #include "sim/simulator.h"
 
 namespace wasp::sim {
@@ -18,7 +18,8 @@ using PoseQueue = rt::SpscQueue<BodyPose, 256>;
 
 class VehicleLoop {
  public:
-  VehicleLoop(const SimConfig& config, TimeNs start_ns, Pty& pty, const shm::Region& truth_region, PoseQueue& poses);
+  VehicleLoop(const SimConfig& config, TimeNs start_ns, CompanionLine& line, const shm::Region& truth_region,
+              PoseQueue& poses);
 
   /// Runs until `stop`. Call from one thread.
   void run(const std::atomic<bool>& stop);
@@ -31,7 +32,7 @@ class VehicleLoop {
 
   Simulator simulator_;
   TimeNs next_ns_;
-  Pty& pty_;
+  CompanionLine& line_;
   shm::RingWriter truth_;
   PoseQueue& poses_;
   std::vector<std::uint8_t> output_;

@@ -51,7 +51,7 @@ DoctorPlan plan_doctor(const std::string& config, int core, double seconds) {
   plan.heap_mib = c.heap_mib;
   plan.control_deadline_ns = c.control_deadline_ns;
   plan.control_budget_ns = c.control_thread.budget_ns;
-  if (const auto line = drivers::Endpoint::parse(c.endpoint); line.kind == drivers::EndpointKind::kSerial)
+  if (const auto line = drivers::Endpoint::parse(c.autopilot.endpoint); line.kind == drivers::EndpointKind::kSerial)
     plan.tty = line.path;
   plan.core = rt::nearest_usable_core(core >= 0 ? core : c.control_thread.core);
   std::vector<scheduling::ThreadRow> rows{c.control_thread, c.link_thread};

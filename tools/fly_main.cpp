@@ -27,6 +27,7 @@ constexpr double kOverhead_s = 8.0;  // arming, landing, start-up: for the progr
 
 /// Waits, with generous patience, until the simulator's serial line is there.
 void wait_for_line(const Run& run, ChildProcess& sim) {
+  if (run.options.udp_port > 0) return;  // the simulator speaks first, whoever was there first
   const TimeNs deadline = rt::now() + 60 * kSecond;
   while (!fs::exists(run.folder / "tty")) {
     if (const auto code = sim.poll())

@@ -57,6 +57,11 @@ std::optional<int> parse_fly_options(int argc, char** argv, FlyOptions& o) {
                  "VRML97 file to fly in (`wasp world make` makes one); default: that of the mission")
       ->check(CLI::ExistingFile)
       ->excludes("--replay");
+  app.add_option("--autopilot", o.autopilot,
+                 "whose autopilot flies: the simulator behaves as that one, and wasp is told (docs/autopilots.md)")
+      ->check(CLI::IsMember({"wasp", "px4", "ardupilot"}));
+  app.add_option("--udp", o.udp_port, "link by UDP to this port in place of a serial line")
+      ->check(CLI::Range(1024, 65535));
   app.add_option("--seed", o.seed, "seed of the simulated world and noise");
   app.add_flag("--no-rt", o.no_rt, "do not ask for real time; every figure is marked 'not real time'");
   app.add_flag("--enforce", o.enforce, "refuse to fly unless real time is granted")->excludes("--no-rt");

@@ -14,8 +14,10 @@ struct FlyOptions {
   std::string name;                   ///< of the run and its folder
   std::filesystem::path out = "out";  ///< parent of the run's folder
   std::string mission = "hover";
-  std::string world;   ///< VRML97 file to fly in, empty: that of the mission
-  double seconds = 0;  ///< total flight time, 0: as configured
+  std::string world;      ///< VRML97 file to fly in, empty: that of the mission
+  std::string autopilot;  ///< whose autopilot flies: px4, ardupilot; empty: as configured, and wasp's own simulated
+  int udp_port = 0;       ///< link by datagrams to this port of ours; 0: a serial line
+  double seconds = 0;     ///< total flight time, 0: as configured
   std::uint64_t seed = 1;
   bool no_rt = false;    ///< never ask for real time
   bool enforce = false;  ///< refuse to fly without it

@@ -70,7 +70,11 @@ void write_override(Run& run, const sim::SimConfig& sim) {
   std::string text = "# written by wasp fly for this run\n[run]\n";
   text += fmt::format("enforce_real_time = {}\nstrict_syscalls = {}\n", run.real_time, run.options.strict_syscalls);
   text += fmt::format("incident_dir = \"{}\"\n", fs::absolute(run.folder / "incidents").string());
-  text += fmt::format("[autopilot]\nendpoint = \"serial:{}:921600\"\n", fs::absolute(run.folder / "tty").string());
+  const std::string line = run.options.udp_port > 0
+                               ? fmt::format("udp://127.0.0.1:{}", run.options.udp_port)
+                               : fmt::format("serial:{}:921600", fs::absolute(run.folder / "tty").string());
+  text += fmt::format("[autopilot]\nendpoint = \"{}\"\n", line);
+  if (!run.options.autopilot.empty()) text += fmt::format("flavour = \"{}\"\n", run.options.autopilot);
   if (run.options.replay.empty()) {
     const Legs legs = planned_legs(run);
     run.flight_seconds = std::accumulate(legs.seconds.begin(), legs.seconds.end(), 0.0);
@@ -170,16 +174,18 @@ std::vector<std::string> flight_arguments(const Run& run) {
 }
 
 std::vector<std::string> sim_arguments(const Run& run) {
-  std::vector<std::string> a{program("wasp-sim"),
-                             "--instance",
-                             run.instance,
-                             "--tty-link",
-                             (run.folder / "tty").string(),
-                             "--config",
-                             (run.mission / "sim.toml").string(),
-                             "--seed",
-                             std::to_string(run.options.seed)};
+  std::vector<std::string> a{
+      program("wasp-sim"),
+      "--instance",
+      run.instance,
+      run.options.udp_port > 0 ? "--udp" : "--tty-link",
+      run.options.udp_port > 0 ? fmt::format("127.0.0.1:{}", run.options.udp_port) : (run.folder / "tty").string(),
+      "--config",
+      (run.mission / "sim.toml").string(),
+      "--seed",
+      std::to_string(run.options.seed)};
   if (!run.options.world.empty()) a.insert(a.end(), {"--world", run.options.world});
+  if (!run.options.autopilot.empty()) a.insert(a.end(), {"--autopilot", run.options.autopilot});
   if (!run.options.replay.empty()) a.push_back("--no-camera");
   if (!run.options.safety_pilot) a.push_back("--no-safety-pilot");
   return a;

@@ -29,7 +29,8 @@ std::string scheduler_text(const Run& run) {
 /// (a simulation on a shared machine).
 double allowed_share(const Run& run) { return run.real_time && rt::kernel_is_preempt_rt() ? 0.0 : 0.05; }
 
-nlohmann::json run_document(const Run& run, const std::vector<Phase>& phases, const std::vector<Result>& results) {
+nlohmann::json run_document(const Run& run, const std::vector<Phase>& phases, const std::vector<Result>& results,
+                            const RunSummary& summary) {
   nlohmann::json doc{{"name", run.options.name},
                      {"mission", run.options.replay.empty() ? run.options.mission : "replay"},
                      {"seconds", run.flight_seconds},
@@ -45,6 +46,7 @@ nlohmann::json run_document(const Run& run, const std::vector<Phase>& phases, co
   const std::time_t now = std::time(nullptr);
   std::strftime(stamp, sizeof stamp, "%Y-%m-%dT%H:%M:%S%z", std::localtime(&now));
   doc["started"] = stamp;
+  if (!summary.autopilot.empty()) doc["autopilot"] = summary.autopilot;
   if (run.options.faults)
     doc["faults"] = "socket " + fault_socket(run).string() +
                     (run.options.fault_timeline.empty() ? "" : ", timeline " + run.options.fault_timeline);
@@ -121,7 +123,7 @@ int conclude(Run& run, int flight_code, bool interrupted) {
                                        : fmt::format("flight process ended with code {}", flight_code);
   const auto phases = read_phases(run.folder / "log");
   const auto results = judge(run, flight_code, phases, summary);
-  write_text(run.folder / "run.json", run_document(run, phases, results).dump(1) + "\n");
+  write_text(run.folder / "run.json", run_document(run, phases, results, summary).dump(1) + "\n");
   ChildProcess report({program("wasp-report"), run.folder.string()}, (run.folder / "log/report.txt").string());
   const TimeNs deadline = rt::now() + 120 * kSecond;
   while (!report.poll() && rt::now() < deadline) rt::sleep_until(rt::now() + 10 * kMillisecond);

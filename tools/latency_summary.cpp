@@ -96,6 +96,8 @@ RunSummary read_run(const shm::Region& flight) {
   s.behaviour_ticks = run->behaviour_ticks.load(kRelaxed);
   s.faults_armed = run->faults_armed.load(kRelaxed) != 0;
   s.mission_result = run->mission_result.load(kRelaxed);
+  for (const auto& letter : run->autopilot)
+    if (const char c = letter.load(kRelaxed); c != '\0') s.autopilot += c;
   const std::size_t n = std::min<std::size_t>(run->behaviour_count.load(kRelaxed), run->behaviours.size());
   for (std::size_t i = 0; i < n; ++i) {
     s.behaviours.push_back(text_of(run->behaviours[i]));
@@ -124,6 +126,7 @@ nlohmann::json run_json(const RunSummary& s) {
           {"behaviour_ticks", s.behaviour_ticks},
           {"faults_armed", s.faults_armed},
           {"mission_result", s.mission_result},
+          {"autopilot", s.autopilot},
           {"behaviour_states", s.behaviour_states},
           {"behaviours", s.behaviours}};
 }
@@ -166,6 +169,7 @@ RunSummary run_from_json(const nlohmann::json& document) {
   s.mission_result = run.value("mission_result", s.mission_result);
   s.behaviour_states = run.value("behaviour_states", s.behaviour_states);
   s.behaviours = run.value("behaviours", s.behaviours);
+  s.autopilot = run.value("autopilot", s.autopilot);
   return s;
 }
 

@@ -34,6 +34,7 @@ struct RunSummary {
   std::uint32_t mission_result = 0;             ///< scheduling::MissionResult
   std::vector<std::uint32_t> behaviour_states;  ///< scheduling::BehaviourState of each behaviour
   std::vector<std::string> behaviours;
+  std::string autopilot;  ///< what the check before arming found; empty: none was made
 };
 
 /// Block `topic` as a T, nullptr if absent, of another type or too small.

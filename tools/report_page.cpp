@@ -214,6 +214,8 @@ void counters(const ReportData& data, Out out) {
                        s.bad_frames, s.link_reconnects, s.incidents, s.commands_refused, s.setpoints_flushed})
     fmt::format_to(out, "<td class='n'>{}</td>", n);
   fmt::format_to(out, "</tr></table></div>\n");
+  if (!s.autopilot.empty())
+    fmt::format_to(out, "{}", paragraph("Check before arming: " + escape_html(s.autopilot), "soft small"));
 }
 
 }  // namespace

@@ -123,7 +123,7 @@ TEST_F(AutopilotLinkTest, RawImuOfArduPilotIsScaled) {
   EXPECT_FLOAT_EQ(heard_.imus[0].gyro_body_radps[0], 0.5f);
   EXPECT_FLOAT_EQ(heard_.imus[0].mag_body_gauss[2], -0.462f);
   EXPECT_FLOAT_EQ(heard_.imus[0].temperature_degc, 45.12f);
-  EXPECT_EQ(heard_.imus[0].fields, 0x11ffu);
+  EXPECT_EQ(heard_.imus[0].fields, 0x11ffu | kFieldCoarse);
 }
 
 TEST_F(AutopilotLinkTest, WorseMessagesStepInOnlyWhenTheBestFallsSilent) {

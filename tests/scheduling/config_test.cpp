@@ -89,6 +89,27 @@ TEST_F(ConfigTest, APartialFileKeepsTheHeightRanks) {
   EXPECT_EQ(c.control.mission.leg_count, 2);
 }
 
+TEST_F(ConfigTest, WhatIsNotSaidFollowsFromTheFlavour) {
+  const Config own = load_config({}, kNames);
+  EXPECT_EQ(own.autopilot.mode(), 1u);
+  EXPECT_FLOAT_EQ(own.control.mission.patience_s, 20.f);
+  EXPECT_EQ(own.control.failsafe_action, control::FailsafeAction::kDescend);
+  const Config px4 = load_config({write("[autopilot]\nflavour = \"px4\"\n")}, kNames);
+  EXPECT_EQ(px4.autopilot.mode(), 6u);
+  EXPECT_FLOAT_EQ(px4.control.mission.patience_s, 120.f);
+  EXPECT_EQ(px4.control.failsafe_action, control::FailsafeAction::kStopStream);
+  const Config copter = load_config({write("[autopilot]\nflavour = \"ardupilot\"\nfollow_mode = 4\narm = false\n"
+                                           "endpoint = \"serial:/dev/ttyS0:57600\"\n"
+                                           "[control]\nfailsafe_action = \"descend\"\n[mission]\npatience_s = 7\n")},
+                                    kNames);
+  EXPECT_EQ(copter.autopilot.mode(), 4u);
+  EXPECT_TRUE(copter.control.mission.pilot_arms);
+  EXPECT_FLOAT_EQ(copter.control.mission.patience_s, 7.f);
+  EXPECT_EQ(copter.control.failsafe_action, control::FailsafeAction::kDescend);
+  EXPECT_LT(copter.autopilot.wish(0.26f).stream_hz, 40.0) << "a slow line";
+  EXPECT_THROW(load_config({write("[autopilot]\nflavour = \"paparazzi\"\n")}, kNames), ConfigError);
+}
+
 TEST_F(ConfigTest, PoliciesAreReadWhereTheyMakeSense) {
   const Config c = load_config({write("[run]\nadmission = \"warn\"\n[threads.control]\noverrun = \"catch_up\"\n"
                                       "[threads.camera]\noverrun = \"stop\"\n"

@@ -241,7 +241,7 @@ class ControlBench {
         command.mission_phase == static_cast<std::uint8_t>(control::MissionPhase::kArm))
       armed_ = armed_ || !autopilot_refuses;
     if (disarmed_for_good) armed_ = false;
-    report_.store({now_ns, armed_ ? 1u : 0u, armed_ && !autopilot_leaves ? 1u : 0u});
+    report_.store({now_ns, armed_ ? 1u : 0u, armed_ && !autopilot_leaves ? 1u : 0u, drivers::SetupBar::kNone, {}});
   }
   void take_commands() {
     Command c;

@@ -254,18 +254,18 @@ TEST(Simulator, HostileSetpointsAreIgnored) {
   mavlink::SetAttitudeTarget m{};
   AttitudeSetpoint setpoint;
   m.q = {1, 0, 0, 0}, m.thrust = 0.5f, m.type_mask = 7;
-  EXPECT_TRUE(setpoint_of(m, setpoint));
+  EXPECT_TRUE(setpoint_of(m, Flavour::kWasp, setpoint));
   m.thrust = std::numeric_limits<float>::quiet_NaN();
-  EXPECT_FALSE(setpoint_of(m, setpoint));
+  EXPECT_FALSE(setpoint_of(m, Flavour::kWasp, setpoint));
   m.thrust = 0.5f, m.q = {0, 0, 0, 0};
-  EXPECT_FALSE(setpoint_of(m, setpoint));
+  EXPECT_FALSE(setpoint_of(m, Flavour::kWasp, setpoint));
   m.q = {1, 0, 0, 0}, m.type_mask = 3, m.body_yaw_rate = std::numeric_limits<float>::infinity();
-  EXPECT_FALSE(setpoint_of(m, setpoint));
+  EXPECT_FALSE(setpoint_of(m, Flavour::kWasp, setpoint));
   m.body_yaw_rate = 0.3f;
-  EXPECT_TRUE(setpoint_of(m, setpoint));
+  EXPECT_TRUE(setpoint_of(m, Flavour::kWasp, setpoint));
   EXPECT_TRUE(setpoint.yaw_by_rate);
   m.type_mask = 64;
-  EXPECT_FALSE(setpoint_of(m, setpoint));
+  EXPECT_FALSE(setpoint_of(m, Flavour::kWasp, setpoint));
 }
 
 TEST(Simulator, SameSeedSameFlight) {
