@@ -77,7 +77,8 @@ void LinkLoop::look_at_line() WASP_REALTIME {
   const TimeNs now_ns = rt::now();
   gate_.look(port_.written_total(), now_ns);
   Command command;
-  const bool ticks = commands_.copy_newest(command) && now_ns - command.due_at_ns < 3 * services_.control_period_ns;
+  // One that sends nothing while it is on the ground will hardly begin within a period.
+  const bool ticks = commands_.copy_newest(command) && command.sent != 0 && now_ns - command.due_at_ns < 3 * services_.control_period_ns;
   gate_.next_setpoint(ticks ? command.due_at_ns + services_.control_period_ns : kNever);
 }
 
