@@ -3,12 +3,9 @@
 #include <nettle/sha2.h>
 
 #include <algorithm>
+#include <cerrno>
 
 namespace wasp::mavlink {
-namespace {
-thread_local const char this_thread = 0;  ///< its address tells threads apart, without asking the kernel
-}  // namespace
-
 std::array<std::uint8_t, 6> signature_of(const SigningKey& key, std::span<const std::uint8_t> covered) WASP_REALTIME {
   sha256_ctx context;
   nettle_sha256_init(&context);
@@ -20,11 +17,12 @@ std::array<std::uint8_t, 6> signature_of(const SigningKey& key, std::span<const 
 }
 
 std::uint8_t FrameSigner::link_of_this_thread() WASP_REALTIME {
+  const int* self = &errno;  // its address is the thread's own
   std::size_t row = 0;
   for (; row + 1 < threads_.size(); ++row) {
-    const char* holder = threads_[row].load(std::memory_order_relaxed);
-    if (holder == &this_thread) break;
-    if (holder == nullptr && threads_[row].compare_exchange_strong(holder, &this_thread, std::memory_order_relaxed))
+    const int* holder = threads_[row].load(std::memory_order_relaxed);
+    if (holder == self) break;
+    if (holder == nullptr && threads_[row].compare_exchange_strong(holder, self, std::memory_order_relaxed))
       break;
   }
   return static_cast<std::uint8_t>(first_link_ + row);

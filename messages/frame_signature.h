@@ -34,7 +34,7 @@ class FrameSigner {
   SigningKey key_;
   SigningClock& clock_;
   std::uint8_t first_link_;
-  std::array<std::atomic<const char*>, kThreads> threads_{};  ///< by the address of a variable each has
+  std::array<std::atomic<const int*>, kThreads> threads_{};  ///< by the address of their errno
 };
 
 }  // namespace wasp::mavlink

@@ -6,7 +6,7 @@
 #include <iterator>
 #include <stdexcept>
 
-#include "messages/frame_parser.h"
+#include "tools/mavlink_scan.h"
 
 namespace wasp::tools {
 namespace {
@@ -41,33 +41,16 @@ std::string_view other_format(Bytes bytes) {
   return {};
 }
 
-struct Extent {
-  std::size_t begin, end;
-};
-
-/// Where the frames with good checksums lie.
-std::vector<Extent> good_frames(Bytes bytes, std::span<const mavlink::MessageInfo> messages) {
-  std::vector<Extent> extents;
-  auto from = bytes.begin();
-  mavlink::Parser parser(messages);
-  parser.feed(bytes, [&](const mavlink::Frame& frame) noexcept {
-    const auto at = std::search(from, bytes.end(), frame.wire.begin(), frame.wire.end());
-    from = at + static_cast<std::ptrdiff_t>(frame.wire.size());
-    extents.push_back({static_cast<std::size_t>(at - bytes.begin()), static_cast<std::size_t>(from - bytes.begin())});
-  });
-  return extents;
-}
-
 /// How the frames stand behind one another: a time's length apart, by the byte order in which that is a likely time, or
 /// without anything between them.
 struct Gaps {
   std::size_t stamped_high = 0, stamped_low = 0, none = 0;
 };
 
-Gaps gaps_of(Bytes bytes, const std::vector<Extent>& frames) {
+Gaps gaps_of(Bytes bytes, const std::vector<FoundFrame>& frames) {
   Gaps gaps;
   std::size_t end = 0;
-  for (const Extent& frame : frames) {
+  for (const FoundFrame& frame : frames) {
     if (frame.begin == end) ++gaps.none;
     if (frame.begin == end + kTimeBytes) {
       const std::uint64_t high = time_of(bytes.subspan(end), true), low = time_of(bytes.subspan(end), false);
@@ -94,14 +77,15 @@ void strip_gap(Bytes gap, bool high_first, MavlinkLog& log) {
   keep(gap, log);
 }
 
-void strip(Bytes bytes, const std::vector<Extent>& frames, bool high_first, MavlinkLog& log) {
+void strip(Bytes bytes, const std::vector<FoundFrame>& frames, bool high_first, MavlinkLog& log) {
   std::size_t end = 0;
-  for (const Extent& frame : frames) {
-    const Bytes gap = bytes.subspan(end, frame.begin - end);
+  for (const FoundFrame& frame : frames) {
+    const std::size_t begin = std::max(end, frame.begin);  // a frame may begin in the signature of the one before
+    const Bytes gap = bytes.subspan(end, begin - end);
     const bool stamped = gap.size() >= kTimeBytes;
     strip_gap(gap.first(gap.size() - (stamped ? kTimeBytes : 0)), high_first, log);
     if (stamped) log.stamps.push_back({log.stream.size(), time_of(gap.last(kTimeBytes), high_first)});
-    keep(bytes.subspan(frame.begin, frame.end - frame.begin), log);
+    keep(bytes.subspan(begin, frame.end - begin), log);
     end = frame.end;
   }
   strip_gap(bytes.subspan(end), high_first, log);
@@ -152,7 +136,8 @@ MavlinkLog mavlink_log_of(std::vector<std::uint8_t> bytes, std::span<const mavli
   log.file_bytes = bytes.size();
   log.why = bytes.empty() ? "empty" : other_format(bytes);
   if (!log.why.empty()) return log;
-  const std::vector<Extent> frames = good_frames(bytes, messages);
+  mavlink::Parser parser(messages);
+  const std::vector<FoundFrame> frames = find_frames(bytes, parser, [] { return std::size_t{4096}; });
   if (frames.empty()) {
     log.why = "no frame with a good checksum in it";
     return log;
