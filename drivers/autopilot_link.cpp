@@ -119,6 +119,7 @@ std::size_t AutopilotLink::encode_attitude_target(const AttitudeTargetCommand& t
                                   [](float component) { return std::isfinite(component); }) &&
                       std::isfinite(target.yaw_rate_radps) && std::isfinite(target.thrust);
   if (!finite) return 0;
+  if (signing_ != nullptr) signing_->follow(now_ns);
   const DurationNs offset = shared_offset_ns_.load(std::memory_order_relaxed);
   const TimeNs stamp_ns = offset == kNever ? now_ns : now_ns + offset;
   mavlink::SetAttitudeTarget m;

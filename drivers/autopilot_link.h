@@ -13,6 +13,7 @@
 #include "drivers/autopilot_samples.h"
 #include "drivers/clock_map.h"
 #include "drivers/companion_state.h"
+#include "drivers/link_signing.h"
 #include "messages/mavlink_frame.h"
 #include "rt/contract.h"
 #include "types/messages.h"
@@ -82,6 +83,13 @@ class AutopilotLink {
   explicit AutopilotLink(const LinkIdentity& identity = {}) noexcept
       : identity_(identity), encoder_(identity.system_id, identity.component_id) {}
 
+  /// From now on what goes out is signed and what comes in is judged; `signing` outlives this. Before the first byte only.
+  void use_signing(LinkSigning& signing) noexcept {
+    signing_ = &signing;
+    encoder_.sign_with(signing.signer());
+    parser_.check_signatures(signing.check());
+  }
+
   /// Takes bytes that arrived at `received_at_ns`. The sink has, all noexcept: on_imu(const ImuSample&),
   /// on_attitude(const AttitudeSample&), on_heartbeat(const AutopilotStatus&), on_ack(uint16_t command, uint8_t
   /// result), on_statustext(uint8_t severity, std::string_view), reply(std::span<const uint8_t>) for frames that must
@@ -90,6 +98,7 @@ class AutopilotLink {
   /// never lie after `received_at_ns`. Realtime-safe: yes if the sink is.
   template <class Sink>
   void receive(std::span<const std::uint8_t> bytes, TimeNs received_at_ns, Sink& sink) WASP_REALTIME {
+    if (signing_ != nullptr) signing_->follow(received_at_ns);
     parser_.feed(bytes, [&](const mavlink::Frame& frame) noexcept {
       if (is_from_autopilot(frame))
         dispatch(frame, received_at_ns, sink);
@@ -126,6 +135,10 @@ class AutopilotLink {
 
   [[nodiscard]] const LinkCounts& counts() const noexcept { return counts_; }
   [[nodiscard]] const mavlink::Counts& wire_counts() const noexcept { return parser_.counts(); }
+  /// Nullptr when signing is off.
+  [[nodiscard]] const mavlink::SignatureCounts* signature_counts() const noexcept {
+    return signing_ == nullptr ? nullptr : &signing_->check().counts();
+  }
   [[nodiscard]] std::span<const mavlink::SourceCounts> sources() const noexcept { return parser_.sources(); }
   [[nodiscard]] const ClockMap& clock() const noexcept { return clock_; }
   /// The line was cut and is back: partial frames, open questions and the clock map are void. Counts stay.
@@ -266,6 +279,7 @@ class AutopilotLink {
   LinkIdentity identity_;
   mavlink::Parser parser_;
   mavlink::Encoder encoder_;
+  LinkSigning* signing_ = nullptr;
   ClockMap clock_;
   std::array<TimeNs, 8> asked_at_ns_{};  ///< ts1 of open questions, 0 when answered
   std::size_t next_question_ = 0;

@@ -17,14 +17,15 @@ std::size_t trimmed_length(std::span<const std::uint8_t> payload) noexcept {
 }  // namespace
 
 std::size_t Encoder::write(std::uint32_t id, std::uint8_t crc_extra, std::span<const std::uint8_t> payload,
-                           std::uint8_t incompat_flags, std::span<std::uint8_t> out) WASP_REALTIME {
+                           std::span<std::uint8_t> out) WASP_REALTIME {
   const std::size_t n = trimmed_length(payload);
-  const std::size_t total = kHeaderV2 + n + kChecksumBytes;
+  const std::size_t covered = kHeaderV2 + n + kChecksumBytes;
+  const std::size_t total = covered + (signer_ != nullptr ? kSignatureBytes : 0);
   if (out.size() < total) return 0;
   const std::uint8_t sequence = std::atomic_ref(sequence_).fetch_add(1, std::memory_order_relaxed);
   const std::array<std::uint8_t, kHeaderV2> header{kStartV2,
                                                    static_cast<std::uint8_t>(n),
-                                                   incompat_flags,
+                                                   signer_ != nullptr ? kIncompatSigned : std::uint8_t{0},
                                                    0,
                                                    sequence,
                                                    system_id_,
@@ -37,6 +38,7 @@ std::size_t Encoder::write(std::uint32_t id, std::uint8_t crc_extra, std::span<c
   const std::uint16_t crc = crc_add(crc_add(kCrcInitial, out.subspan(1, kHeaderV2 - 1 + n)), crc_extra);
   out[kHeaderV2 + n] = static_cast<std::uint8_t>(crc);
   out[kHeaderV2 + n + 1] = static_cast<std::uint8_t>(crc >> 8);
+  if (signer_ != nullptr) signer_->append(out, covered);
   return total;
 }
 

@@ -18,11 +18,12 @@ inline constexpr std::uint8_t kIncompatSigned = 0x01;
 inline constexpr std::size_t kMaxFrame = kHeaderV2 + kMaxPayload + kChecksumBytes + kSignatureBytes;
 static_assert(kMaxFrame == 280);
 
-/// Row of a message id, nullptr if this message set lacks it. Realtime-safe: yes (binary search).
-inline const MessageInfo* find_message(std::uint32_t id) WASP_REALTIME {
-  const auto* row = std::lower_bound(kMessages.begin(), kMessages.end(), id,
-                                     [](const MessageInfo& info, std::uint32_t wanted) { return info.id < wanted; });
-  return row != kMessages.end() && row->id == id ? row : nullptr;
+/// Row of a message id, nullptr if `messages`, which rise in id, lack it. Realtime-safe: yes (binary search).
+inline const MessageInfo* find_message(std::uint32_t id,
+                                       std::span<const MessageInfo> messages = kMessages) WASP_REALTIME {
+  const auto row = std::lower_bound(messages.begin(), messages.end(), id,
+                                    [](const MessageInfo& info, std::uint32_t wanted) { return info.id < wanted; });
+  return row != messages.end() && row->id == id ? &*row : nullptr;
 }
 
 /// One frame with a good checksum. Pointers are valid for the duration of the callback that hands it out.
@@ -33,7 +34,8 @@ struct Frame {
   std::uint32_t message_id = 0;
   const std::uint8_t* payload = nullptr;
   std::size_t length = 0;                   ///< bytes sent: 0 ... 255, may be below or above the message's own length
-  bool is_signed = false;                   ///< carries a signature, which nobody has verified
+  bool is_signed = false;                   ///< carries a signature
+  bool is_verified = false;                 ///< and it was found right (signature_check.h)
   std::span<const std::uint8_t> signature;  ///< link id, 6 bytes of time, 6 bytes of hash; empty when unsigned
   std::span<const std::uint8_t> wire;       ///< the whole frame as received
 

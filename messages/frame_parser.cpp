@@ -33,7 +33,15 @@ void Parser::drop(std::size_t n) noexcept {
 void Parser::reset() noexcept {
   counts_.skipped_bytes += available();
   drop(available());
-  due_ = offset_;
+  due_ = counted_until_ = signature_until_ = offset_;
+}
+
+/// Leaves a frame behind, but for a signature that may hold bytes of the next one.
+void Parser::consume(const Claim& claim) noexcept {
+  const bool doubtful = claim.frame.is_signed && !claim.frame.is_verified;
+  const std::size_t searched = doubtful ? kSignatureBytes : 0;
+  drop(claim.total - searched);
+  due_ = counted_until_ = signature_until_ = offset_ + searched;
 }
 
 bool Parser::next(Frame& frame) noexcept {
@@ -43,15 +51,17 @@ bool Parser::next(Frame& frame) noexcept {
       case Verdict::kNeedMore:
         return false;
       case Verdict::kNotAFrame:
-        ++counts_.skipped_bytes;
+        if (offset_ >= signature_until_) ++counts_.skipped_bytes;
         drop(1);
         break;
       case Verdict::kPassOver:
         drop(claim.total);
         break;
+      case Verdict::kRefused:
+        consume(claim);
+        break;
       case Verdict::kGood:
-        drop(claim.total);
-        due_ = offset_;
+        consume(claim);
         frame = claim.frame;
         return true;
     }
@@ -88,9 +98,10 @@ Parser::Verdict Parser::examine(Claim& claim) noexcept {
   if (claim.frame.system_id == 0 || claim.frame.component_id == 0) return refuse_header();
   if ((claim.incompat_flags & ~kIncompatSigned) != 0)
     return examine_unverifiable(claim, &Counts::unsupported_flags, &SourceCounts::unsupported_flags);
-  const MessageInfo* info = find_message(claim.frame.message_id);
+  const MessageInfo* info = find_message(claim.frame.message_id, messages_);
   if (info == nullptr) return examine_unverifiable(claim, &Counts::unknown_id, &SourceCounts::unknown_id);
   if (claim.frame.version == 1 && claim.frame.length != info->min_length) return refuse_header();
+  if (offset_ < signature_until_ && !continues_a_sender(claim.frame)) return Verdict::kNotAFrame;
   if (available() < claim.total) return Verdict::kNeedMore;
   return check(claim, info->crc_extra);
 }
@@ -115,6 +126,14 @@ int Parser::steps_ahead(const Frame& frame, const Frame& before) noexcept {
   return static_cast<std::uint8_t>(frame.sequence - source->last_sequence - source->unverified_since_good);
 }
 
+/// Inside a signature only a frame that goes on where its sender was is believed, so that random bytes seldom make the
+/// next frame wait.
+bool Parser::continues_a_sender(const Frame& frame) noexcept {
+  constexpr int kNear = 32;
+  const SourceCounts* source = sources_.find(frame.system_id, frame.component_id);
+  return source != nullptr && static_cast<std::uint8_t>(frame.sequence - source->last_sequence - 1) < kNear;
+}
+
 /// True if a good frame inside the claim is not its payload but its neighbour, so that the claimed length is damaged:
 /// it ends exactly where the claim ends, or is the next of a sender of whom the frame behind the claim says nothing.
 bool Parser::swallows_a_frame(const Claim& claim, const Frame& follower) noexcept {
@@ -125,7 +144,7 @@ bool Parser::swallows_a_frame(const Claim& claim, const Frame& follower) noexcep
     if ((start != kStartV1 && start != kStartV2) || !read_header(at, inner) || at + inner.total > claim.total) continue;
     const int ahead = same_sender(inner.frame, follower) ? 0 : steps_ahead(inner.frame, claim.frame);
     if (at + inner.total != claim.total && (ahead == 0 || ahead > kNear)) continue;
-    const MessageInfo* info = find_message(inner.frame.message_id);
+    const MessageInfo* info = find_message(inner.frame.message_id, messages_);
     if (info != nullptr && checksum_holds(at, inner, info->crc_extra)) return true;
   }
   return false;
@@ -166,10 +185,19 @@ Parser::Verdict Parser::check(Claim& claim, std::uint8_t crc_extra) noexcept {
   f.wire = wire;
   f.payload = wire.data() + claim.header;
   if (f.is_signed) f.signature = wire.last(kSignatureBytes);
+  if (!admitted(f)) return Verdict::kRefused;
   ++counts_.good;
   counts_.signed_frames += f.is_signed ? 1 : 0;
   counts_.sequence_lost += sources_.add_good(f.system_id, f.component_id, f.sequence, counts_.untracked_sources);
   return Verdict::kGood;
+}
+
+bool Parser::admitted(Frame& f) noexcept {
+  if (signatures_ == nullptr) return true;
+  const SignatureVerdict verdict = signatures_->judge(f);
+  f.is_verified = f.is_signed && verdict != SignatureVerdict::kWrong;
+  if (!passes(verdict)) ++counts_.refused;
+  return passes(verdict);
 }
 
 }  // namespace wasp::mavlink

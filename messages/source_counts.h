@@ -19,7 +19,8 @@ struct Counts {
   std::uint64_t unknown_id = 0;         ///< where a frame was due: an id this message set lacks, so not verifiable
   std::uint64_t unsupported_flags = 0;  ///< where a frame was due: incompatibility bits other than "signed"
   std::uint64_t sequence_lost = 0;      ///< frames missing by sequence number
-  std::uint64_t signed_frames = 0;      ///< good frames that carry a signature (not verified)
+  std::uint64_t signed_frames = 0;      ///< good frames that carry a signature
+  std::uint64_t refused = 0;            ///< not handed out: signature_check.h knows why
   std::uint64_t skipped_bytes = 0;      ///< bytes in no frame, good or passed over whole
   std::uint64_t untracked_sources = 0;  ///< good frames of senders the table below has no room for
 };

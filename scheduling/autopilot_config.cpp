@@ -58,6 +58,8 @@ void read_autopilot(TomlTable t, AutopilotConfig& c) {
     if (meaning == kMeanings[i]) c.thrust_field = i;
   t.number("hover_thrust", c.hover_thrust, 0, 0.95);
   t.number("stream_hz", c.stream_hz, 0, 400);
+  t.text_value("signing", c.signing.mode, {"off", "sign", "require"});
+  t.text_value("signing_key_file", c.signing.key_file);
   t.finish();
 }
 

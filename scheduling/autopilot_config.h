@@ -19,6 +19,7 @@ struct AutopilotConfig {
   bool enforce_check = true;  ///< false: parameters that are not as they must be are only said
   int thrust_field = 0;       ///< what it means: 0 as read from the autopilot, 1 climb rate, 2 thrust
   double hover_thrust = 0;    ///< 0 ... 1; 0: read back, then learned in flight
+  drivers::SigningSettings signing;
   double stream_hz = 0;       ///< attitude and IMU; 0: 100, or what a slow serial line carries
 
   [[nodiscard]] std::uint32_t mode() const {

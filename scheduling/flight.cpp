@@ -32,6 +32,7 @@ namespace wasp::scheduling {
 namespace {
 
 constexpr double kBitsPerByte = 10, kSocket_Bps = 20'000;
+constexpr DurationNs kSigningSavePeriod = 60 * kSecond;
 constexpr double kReplayTail_s = 0.3;  // the last frames' cues reach a command before the replay ends
 
 void log_at(TimeNs at_ns, const char* text) { std::fprintf(stderr, "%10.3f  %s\n", to_seconds(at_ns), text); }
@@ -94,7 +95,9 @@ class Flight {
         flight_files_{flight_.name()},
         stages_(stage_table(flight_)),
         port_(open_line(options, config_)),
+        signing_(drivers::open_signing(config_.autopilot.signing, drivers::LinkSigning::kFlightLink)),
         autopilot_(config_.autopilot.identity()) {
+    if (signing_) sign_line();
     control_.status = &run_status(flight_);
     control_.status->preempt_rt = rt::kernel_is_preempt_rt() ? 1 : 0;
     control_.status->incarnation = incarnation();
@@ -129,6 +132,32 @@ class Flight {
  private:
   /// Flying processes before this one on the same line.
   [[nodiscard]] std::uint32_t incarnation() const { return guard_ ? guard_->block().incarnation.load() : 0; }
+
+  /// A flight that was started again goes on from the time the one before it had reached.
+  void sign_line() {
+    if (guard_) signing_->clock().advance_to(guard_->block().signing_time.load());
+    autopilot_.use_signing(*signing_);
+    save_signing_time();
+    log(config_.autopilot.signing.mode == "require" ? "the autopilot's line is signed, unsigned frames are refused"
+                                          : "what goes to the autopilot is signed");
+  }
+  void save_signing_time() {
+    signing_saved_at_ns_ = rt::now();
+    if (!signing_->save()) log("cannot store the signing time in " + signing_->time_file());
+  }
+  /// Now and then, from the supervising thread.
+  void keep_signing_time() {
+    if (guard_) guard_->block().signing_time.store(signing_->clock().now());
+    if (rt::now() - signing_saved_at_ns_ >= kSigningSavePeriod) save_signing_time();
+  }
+  void end_signing() {
+    save_signing_time();
+    const mavlink::SignatureCounts& n = signing_->check().counts();
+    if (n.refused() > 0)
+      log("frames refused: " + std::to_string(n.unsigned_refused) + " unsigned, " + std::to_string(n.wrong) +
+          " wrongly signed, " + std::to_string(n.old) + " replayed, " + std::to_string(n.too_late) + " too late, " +
+          std::to_string(n.no_room) + " of too many streams");
+  }
 
   void open_camera() {
     if (options_.replay.empty()) {
@@ -343,12 +372,14 @@ class Flight {
       drain_events();
       supervisor_->look();
       look_at_computer();
+      if (signing_) keep_signing_time();
     }
     control_.stop = true;
     if (faults_) faults_->stop();
     threads_.clear();
     supervisor_->look();
     drain_events();
+    if (signing_) end_signing();
     if (const std::uint64_t lost = control_events_.dropped() + link_events_.dropped() + relay_events_.dropped();
         lost > 0)
       log(std::to_string(lost) + " events were lost: their queue was full");
@@ -372,6 +403,8 @@ class Flight {
   WatchBoard board_;
   DurationNs frame_period_ns_ = 0;
   drivers::LinePort port_;
+  std::unique_ptr<drivers::LinkSigning> signing_;  ///< of a signed line
+  TimeNs signing_saved_at_ns_ = 0;
   drivers::AutopilotLink autopilot_;
   std::unique_ptr<shm::Region> camera_;
   std::map<std::string, BehaviourScript> scripts_;

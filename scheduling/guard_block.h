@@ -25,6 +25,7 @@ struct GuardBlock {
   std::atomic<float> neutral_thrust{0};       ///< level, a gentle descent: 0 ... 1; 0 on the ground
   std::atomic<std::uint32_t> custom_mode{0};  ///< of the last heartbeat (drivers/companion_state.h)
   std::atomic<TimeNs> beat_at_ns{0};
+  std::atomic<std::uint64_t> signing_time{0};  ///< reached on a signed line: whoever speaks next goes on from there
 
   // Written by the guardian.
   alignas(64) std::atomic<std::uint32_t> owner{0};  ///< LineOwner; the control thread writes nothing while it is 1

@@ -61,8 +61,10 @@ Guardian::Guardian(GuardPlan plan, std::vector<std::string> command, bool real_t
       port_(drivers::Endpoint::parse(plan_.autopilot.endpoint)),
       watchdog_(plan_.guard.watchdog),
       page_(GuardPage::create()),
+      signing_(drivers::open_signing(plan_.autopilot.signing, drivers::LinkSigning::kGuardianLink)),
       voice_(plan_.autopilot.identity()) {
   sched_getaffinity(0, sizeof cores_, &cores_);
+  if (signing_) voice_.use_signing(*signing_);
   if (!plan_.guard.neutral) plan_.guard.times.neutral_ns = 0;
   if (!real_time) {  // ordinary threads are late by the host's leave: patience for tens of milliseconds
     plan_.guard.times.patience_ns *= 5;
@@ -181,6 +183,10 @@ void Guardian::speak(TimeNs now_ns) {
   GuardBlock& block = page_.block();
   std::array<std::uint8_t, 256> out;
   std::size_t used = 0;
+  if (signing_) {  // not behind the flight, which may have learned a later time from the autopilot
+    signing_->follow(now_ns);
+    signing_->clock().advance_to(block.signing_time.load());
+  }
   if (now_ns >= heartbeat_due_ns_) {
     drivers::CompanionState state{FlightMode::kFailsafe, ModeReason::kNone, true,
                                   static_cast<std::uint8_t>(block.incarnation.load())};

@@ -45,7 +45,8 @@ class Guardian {
   drivers::LinePort port_;
   HardwareWatchdog watchdog_;
   GuardPage page_;
-  drivers::AutopilotLink voice_;  ///< encodes
+  std::unique_ptr<drivers::LinkSigning> signing_;  ///< of a signed line
+  drivers::AutopilotLink voice_;                   ///< encodes
   drivers::HandoverSockets sockets_;
   std::unique_ptr<FlightChild> flight_;
   GuardState state_;

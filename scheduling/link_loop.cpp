@@ -116,6 +116,7 @@ void LinkLoop::take(LoopControl& control) WASP_REALTIME {
   watch_for_sense(received_at_ns_);
   control.status->bad_frames.store(autopilot_.wire_counts().bad_crc, std::memory_order_relaxed);
   watch_the_other_side(*control.status);
+  watch_signatures();
   ask_for_beats();
 }
 
@@ -162,6 +163,19 @@ void LinkLoop::watch_the_other_side(RunStatus& status) WASP_REALTIME {
     stranger_due_ns_ = received_at_ns_ + kStrangerPeriod;
   }
   seen_ = now;
+}
+
+/// Says why frames of a signed line were refused, once a burst.
+void LinkLoop::watch_signatures() WASP_REALTIME {
+  const mavlink::SignatureCounts* now = autopilot_.signature_counts();
+  if (now == nullptr) return;
+  const std::string_view why = drivers::refusal_since(signatures_seen_, *now);
+  signatures_seen_ = *now;
+  if (why.empty()) return;
+  const bool news = why != refusal_told_ || received_at_ns_ >= refusal_until_ns_;
+  refusal_told_ = why;
+  refusal_until_ns_ = received_at_ns_ + kQuiet;
+  if (news) events_.say(received_at_ns_, "frame refused: ", why);
 }
 
 /// Says what is wrong with a stream's samples, once a burst.

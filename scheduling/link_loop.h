@@ -58,6 +58,7 @@ class LinkLoop {
   bool usable(drivers::SampleFault fault, std::string_view head, Told& told) WASP_REALTIME;
   void tell(drivers::SampleFault fault, std::string_view head, Told& told) WASP_REALTIME;
   void watch_the_other_side(RunStatus& status) WASP_REALTIME;
+  void watch_signatures() WASP_REALTIME;
   void ask_for_beats() WASP_REALTIME;
   void set_up(TimeNs now_ns, RunStatus& status) WASP_REALTIME;
   void look_at_line() WASP_REALTIME;
@@ -87,6 +88,9 @@ class LinkLoop {
   Told imu_told_, attitude_told_, driver_;
   std::uint64_t implausible_ = 0;  ///< samples refused here
   drivers::LinkCounts seen_;       ///< of the driver, at the last look
+  mavlink::SignatureCounts signatures_seen_;
+  std::string_view refusal_told_;
+  TimeNs refusal_until_ns_ = 0;  ///< the same is not said again before
   TimeNs opened_at_ns_ = 0, stranger_due_ns_ = 0, clock_due_ns_ = 0;
   bool beats_asked_ = false;
   std::uint16_t refused_command_ = 0;  ///< what was last said of an acknowledgement, and until when it is no news

@@ -77,6 +77,13 @@ void AutopilotLink::apply_parameters() {
                          static_cast<float>(parameters_.value("WPNAV_SPEED_DN", 150) / 100));
 }
 
+void AutopilotLink::use_signing(const std::string& key_file) {
+  if (key_file.empty()) return;
+  signing_ = drivers::open_signing({"require", key_file}, drivers::LinkSigning::kAutopilotLink);
+  encoder_.sign_with(signing_->signer());
+  parser_.check_signatures(signing_->check());
+}
+
 template <class Message>
 void AutopilotLink::send(const Message& message) {
   std::array<std::uint8_t, 280> bytes{};
@@ -91,6 +98,7 @@ void AutopilotLink::drain(std::vector<std::uint8_t>& out) {
 }
 
 void AutopilotLink::receive(std::span<const std::uint8_t> bytes, TimeNs now_ns) {
+  if (signing_) signing_->follow(now_ns);
   parser_.feed(bytes, [&](const mavlink::Frame& frame) { handle(frame, now_ns); });
 }
 
@@ -251,6 +259,7 @@ void AutopilotLink::on_timesync(const mavlink::Timesync& sync, const mavlink::Fr
 
 void AutopilotLink::step(const ImuSample& imu, const LocalPosition& where, TimeNs now_ns) {
   if (now_ns < silent_until_ns_) return;
+  if (signing_) signing_->follow(now_ns);
   if (due(kImu)) send_imu(imu, now_ns);
   if (due(kAttitude)) send_attitude(now_ns);
   if (due(kPosition)) send_position(where, now_ns);

@@ -10,9 +10,12 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <span>
+#include <string>
 #include <vector>
 
+#include "drivers/link_signing.h"
 #include "messages/mavlink_frame.h"
 #include "messages/mavlink_messages.h"
 #include "sim/autopilot_parameters.h"
@@ -36,6 +39,12 @@ class AutopilotLink {
  public:
   /// `clock_offset_ns`: autopilot time minus simulation time. Its kind is the flight controller's.
   AutopilotLink(FlightController& flight, DurationNs clock_offset_ns, Chatter chatter = Chatter::kFull);
+
+  /// Signs what it sends and obeys only what is signed with the key of this file; "": neither. Throws as LinkSigning.
+  void use_signing(const std::string& key_file);
+  [[nodiscard]] const mavlink::SignatureCounts* signature_counts() const {
+    return signing_ ? &signing_->check().counts() : nullptr;
+  }
 
   /// Bytes from the companion, in any pieces.
   void receive(std::span<const std::uint8_t> bytes, TimeNs now_ns);
@@ -81,6 +90,7 @@ class AutopilotLink {
 
   FlightController& flight_;
   DurationNs clock_offset_ns_, companion_offset_ns_ = 0;
+  std::unique_ptr<drivers::LinkSigning> signing_;
   mavlink::Encoder encoder_{1, 1};
   mavlink::Parser parser_;
   SensorFailures failures_;

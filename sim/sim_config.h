@@ -29,6 +29,7 @@ struct SimConfig {
   std::uint32_t seed = 1;
   bool safety_pilot = true;
   PilotParams pilot;
+  std::string signing_key_file;                        ///< not empty: signs, and obeys only what this key signed
   double clock_offset_s = 1000.25;                     ///< autopilot clock minus the simulator's, 0 ... 1e6
   drivers::Flavour flavour = drivers::Flavour::kWasp;  ///< whose autopilot it behaves as
   std::vector<std::string> autopilot_parameters;       ///< "NAME=VALUE", over those from the factory

@@ -27,7 +27,7 @@ using namespace wasp;
 using namespace wasp::sim;
 
 struct Options {
-  std::string instance = "wasp", tty_link, second_link, udp, config_path, world_kind, world_file, autopilot;
+  std::string instance = "wasp", tty_link, second_link, udp, config_path, world_kind, world_file, autopilot, signing_key;
   std::vector<std::string> parameters;
   std::optional<std::uint32_t> seed;
   std::optional<double> rate_hz;
@@ -97,6 +97,8 @@ void declare(CLI::App& app, Options& o) {
       "--no-safety-pilot", o.no_safety_pilot,
       "do not hold the vehicle over its place: without this flag a small slow trim (at most 3 degrees, from the "
       "true position) is added to roll and pitch, as the supervising pilot of the thesis' flights would");
+  app.add_option("--signing-key", o.signing_key,
+                 "the autopilot signs what it sends, and obeys only what is signed with the key in this file");
   app.add_option("--seconds", o.seconds, "end after this time; 0: run until SIGINT or SIGTERM")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
@@ -106,6 +108,7 @@ void declare(CLI::App& app, Options& o) {
 SimConfig settings(const Options& o) {
   SimConfig config = o.config_path.empty() ? SimConfig{} : load_sim_config(o.config_path);
   config.world_file = o.world_file;
+  config.signing_key_file = o.signing_key;
   if (!o.world_kind.empty()) config.world_kind = o.world_kind;
   if (find_scene_kind(config.world_kind) == nullptr)
     throw std::runtime_error("--world-kind " + config.world_kind + ": known are " + scene_kind_names());

@@ -25,6 +25,7 @@ Simulator::Simulator(const SimConfig& config, TimeNs start_ns)
       now_ns_(start_ns) {
   for (const auto& assignment : config.autopilot_parameters) link_.parameters().set(assignment);
   link_.apply_parameters();
+  link_.use_signing(config.signing_key_file);
   if (stand_.turntable) physics_step();
 }
 

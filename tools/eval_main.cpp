@@ -6,8 +6,10 @@
 #include <algorithm>
 #include <cstdio>
 #include <exception>
+#include <string_view>
 
 #include "tools/eval_kernels.h"
+#include "tools/eval_mavlink.h"
 
 namespace {
 
@@ -16,7 +18,7 @@ using namespace wasp::tools;
 std::string kernel_help() {
   std::string text = "Kernels:\n";
   for (const EvalKernel& kernel : kEvalKernels) text += fmt::format("  {:<14}{}\n", kernel.name, kernel.what);
-  return text;
+  return text + "And: mavlink, over recorded MAVLink logs, with options of its own (mavlink --help).\n";
 }
 
 std::string check_kernel(const std::string& name) {
@@ -42,6 +44,7 @@ int run(const EvalKernel& kernel, const std::string& folder, const EvalOptions& 
 }  // namespace
 
 int main(int argc, char** argv) {
+  if (argc > 1 && std::string_view(argv[1]) == "mavlink") return eval_mavlink_main(argc - 1, argv + 1);
   CLI::App app{"Runs a vision kernel over a recording and prints detection, error and time per frame.", "wasp-eval"};
   app.footer(kernel_help());
   std::string kernel, folder;

@@ -188,6 +188,8 @@ std::vector<std::string> sim_arguments(const Run& run) {
   if (!run.options.autopilot.empty()) a.insert(a.end(), {"--autopilot", run.options.autopilot});
   if (!run.options.replay.empty()) a.push_back("--no-camera");
   if (!run.options.safety_pilot) a.push_back("--no-safety-pilot");
+  const auto signing = scheduling::load_guard_plan(configuration_files(run)).autopilot.signing;
+  if (signing.mode != "off") a.insert(a.end(), {"--signing-key", signing.key_file});
   return a;
 }
 

@@ -207,6 +207,26 @@ TEST(Fly, RealTimeThreadsAllocateNothingAndKeepToTheirSystemCalls) {
   EXPECT_EQ(guarded.find("violations 0"), 0u) << guarded;
 }
 
+/// The whole conversation signed, both ways required, and the signing part of the real-time loops without the heap.
+TEST(Fly, OnASignedLine) {
+  TemporaryFolder out;
+  const std::string guard = std::string("LD_PRELOAD=") + WASP_BINARY_DIR +
+                            "/lib/libwasp_malloc_guard.so WASP_MALLOC_GUARD_OUT=" + (out.path / "guard.txt").string();
+  const fs::path key = out.path / "key", config = out.path / "signed.toml";
+  std::ofstream(key) << std::string(64, '7') << "\n";
+  fs::permissions(key, fs::perms::owner_read | fs::perms::owner_write);
+  std::ofstream(config) << "[autopilot]\nsigning = \"require\"\nsigning_key_file = \"" << key.string() << "\"\n";
+  const std::string name = fly_to_the_end(out, "signed", "--seconds 4 --config " + config.string(), guard);
+  const std::string log = read_text(out.path / name / "log/flight.txt");
+  EXPECT_NE(log.find("mission flown to its end"), std::string::npos) << log;
+  EXPECT_NE(log.find("the autopilot's line is signed"), std::string::npos) << log;
+  EXPECT_EQ(log.find("frames refused"), std::string::npos) << log;
+  EXPECT_EQ(log.find(std::string(8, '7')), std::string::npos) << "the key is never logged";
+  EXPECT_GT(std::stoull(read_text(key.string() + ".time")), 0u);
+  const std::string guarded = read_text(out.path / "guard.txt");
+  EXPECT_EQ(guarded.find("violations 0"), 0u) << guarded;
+}
+
 TEST(Fly, TheShippedExampleIsMadeByOurSimulatorAndReplays) {
   TemporaryFolder out;
   const auto [text, code] = run_shell(fly(out, unique("ex"), "--replay example --seconds 3"));

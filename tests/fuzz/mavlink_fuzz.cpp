@@ -1,9 +1,12 @@
 // The MAVLink parser and the conversation above it. An input is either a byte stream as it is, or a script of frames
 // whose checksums are made right here, since a fuzzer never hits one: only so do payloads reach the conversation.
 // Promises: however a stream is cut into pieces, the same frames come out; each has its checksum by another
-// implementation; samples are finite and never of the future; what is answered is one good frame.
+// implementation; samples are finite and never of the future; what is answered is one good frame. On a signed line, with a
+// key that the input may know, only what is rightly signed comes out, and the times of a stream rise.
 #include <cmath>
 #include <vector>
+
+#include "messages/signature_check.h"
 
 #include "drivers/autopilot_link.h"
 #include "tests/fuzz/bitwise_crc.h"
@@ -93,6 +96,34 @@ void check_stream(std::span<const std::uint8_t> stream, std::uint64_t seed) {
   require(at_once.counts().skipped_bytes <= stream.size(), "no byte is skipped twice");
 }
 
+constexpr mavlink::SigningKey kKey{{1, 2, 3}};
+
+/// The same on a signed line: what is handed out carries the signature of the key, or is RADIO_STATUS, and no time of a
+/// stream comes twice.
+void check_signed_stream(std::span<const std::uint8_t> stream, std::uint64_t seed) {
+  mavlink::SigningClock first_clock(seed % 1000), second_clock(seed % 1000);
+  mavlink::SignatureCheck first_check(kKey, first_clock, true), second_check(kKey, second_clock, true);
+  mavlink::Parser at_once, in_pieces;
+  at_once.check_signatures(first_check);
+  in_pieces.check_signatures(second_check);
+  Accepted first, second;
+  at_once.feed(stream, [&](const mavlink::Frame& f) noexcept {
+    first.add(f);
+    require(f.is_verified || f.is<mavlink::RadioStatus>(), "only the signed come through");
+    if (!f.is_signed) return;
+    const auto six = mavlink::signature_of(kKey, f.wire.first(f.wire.size() - 6));
+    require(std::equal(six.begin(), six.end(), f.signature.begin() + 7), "the signature is right");
+  });
+  Pieces pieces(seed);
+  for (auto rest = stream; !rest.empty();) {
+    const std::size_t n = std::min(pieces.next(), rest.size());
+    in_pieces.feed(rest.first(n), [&](const mavlink::Frame& f) noexcept { second.add(f); });
+    rest = rest.subspan(n);
+  }
+  require(first == second && first_check.counts().refused() == second_check.counts().refused(), "pieces change nothing");
+  require(at_once.counts().refused == first_check.counts().refused(), "refusals are counted");
+}
+
 std::uint64_t digest_of(std::span<const std::uint8_t> bytes) {
   std::uint64_t h = 1;
   for (const std::uint8_t byte : bytes) h = mixed(h, byte);
@@ -120,7 +151,14 @@ void append_frame(FuzzInput& in, std::vector<std::uint8_t>& out) {
   for (std::size_t i = start + 1; i < out.size(); ++i) crc = fuzz::bitwise_crc(crc, out[i]);
   crc = fuzz::bitwise_crc(crc, info.crc_extra);
   put(crc & 0xFF), put(crc >> 8);
-  if (is_signed) out.resize(out.size() + 13, 0x5A);
+  if (!is_signed) return;
+  out.resize(out.size() + 13, 0x5A);
+  if ((how & 32) == 0) return;  // else rightly, at a time of the input's
+  const auto time = in.take_bytes(2);
+  std::copy(time.begin(), time.end(), out.end() - 12);
+  std::fill(out.end() - 10, out.end() - 6, std::uint8_t{0});
+  const auto six = mavlink::signature_of(kKey, std::span(out).subspan(start, out.size() - 6 - start));
+  std::copy(six.begin(), six.end(), out.end() - 6);
 }
 
 /// The link over a script of what arrives and what time does.
@@ -169,5 +207,6 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     link.receive(stream, sink.received_at_ns, sink);
   }
   wasp::check_stream(stream, wasp::digest_of({data, size}));
+  wasp::check_signed_stream(stream, wasp::digest_of({data, size}));
   return 0;
 }

@@ -121,12 +121,13 @@ bool same(std::span<const std::uint8_t> a, std::span<const std::uint8_t> b) {
 
 struct Tally {
   std::uint64_t mutants = 0, unchanged = 0, good_sent = 0, good_lost = 0;
+  /// Of them, those whose first bytes complete the mutant before them: on the wire stands the mutant's original, whole.
+  std::uint64_t lost_to_completion = 0;
   std::uint64_t again = 0;           ///< accepted once more, or out of the damage: an original, whole
   std::uint64_t signature_only = 0;  ///< an original but for signature bytes, which no checksum covers
   std::uint64_t collisions = 0, unexplained = 0;
   std::array<std::uint64_t, 5> lost_by_one_mutant{};  ///< 0, 1, 2, 3, more
-  /// Good frames lost, by the last damage of the mutant before them: of a signed frame (one that lost bytes of its
-  /// signature takes them from its neighbour: the checksum ends before it), of any other.
+  /// Good frames lost, by the last damage of the mutant before them: of an unsigned frame, of a signed one.
   std::array<std::array<std::uint64_t, 2>, kKinds.size()> lost_to{};
 };
 
@@ -154,7 +155,8 @@ class Campaign {
     Bytes wire;
     bool good = false, seen = false;
     bool is_signed = false;
-    std::size_t kind = 0;  ///< damage
+    bool completes = false;  ///< the mutant before it
+    std::size_t kind = 0;    ///< damage
   };
   static constexpr std::size_t kRemembered = 48;  ///< far more than a parser's buffer of 1024 bytes can hold back
 
@@ -166,9 +168,22 @@ class Campaign {
     return originals_.back();
   }
   void send_good() {
-    const Original& frame = remember(true);
+    Original& frame = remember(true);
+    frame.completes = completes_mutant(frame.wire);
+    mutant_.clear();
     stream_.insert(stream_.end(), frame.wire.begin(), frame.wire.end());
     ++tally_.good_sent;
+  }
+  /// The end of the last mutant and the first bytes of `next` are what the checksum of its original speaks for.
+  bool completes_mutant(const Bytes& next) const {
+    if (mutant_.empty()) return false;
+    const std::span<const std::uint8_t> original = checked_part(mutant_of_);
+    Bytes joined = mutant_;
+    for (std::size_t i = 0; i < std::min<std::size_t>(8, next.size()); ++i) {
+      joined.push_back(next[i]);
+      if (joined.size() >= original.size() && same(std::span(joined).last(original.size()), original)) return true;
+    }
+    return false;
   }
   void send_mutant() {
     Original& frame = remember(false);
@@ -181,6 +196,7 @@ class Campaign {
     frame.is_signed = has_signature(frame.wire) || has_signature(donor);
     tally_.unchanged += same(mutant, frame.wire) ? 1 : 0;
     stream_.insert(stream_.end(), mutant.begin(), mutant.end());
+    mutant_ = mutant, mutant_of_ = frame.wire;
     ++tally_.mutants;
   }
 
@@ -229,6 +245,7 @@ class Campaign {
       lost_ = 0, kind_ = oldest.kind, is_signed_ = oldest.is_signed;
     } else if (!oldest.seen) {
       ++tally_.good_lost;
+      tally_.lost_to_completion += oldest.completes ? 1 : 0;
       ++tally_.lost_to[kind_][is_signed_ ? 1 : 0];
       ++lost_;
     }
@@ -244,6 +261,7 @@ class Campaign {
   mavlink::Parser parser_;
   std::deque<Original> originals_;
   Bytes stream_;
+  Bytes mutant_, mutant_of_;  ///< the last one sent and its original, until a good frame follows
   Tally tally_;
   std::uint64_t lost_ = 0;  ///< good frames lost since the last mutant that was retired
   std::size_t kind_ = 0;    ///< of that mutant
@@ -256,6 +274,7 @@ void print(const Tally& t) {
   row("  of them as before their damage", t.unchanged);
   row("good frames sent between them", t.good_sent);
   row("good frames lost", t.good_lost);
+  row("  of them to a mutant that their own first bytes complete", t.lost_to_completion);
   std::printf("%14s  good frames lost by one mutant: 0: %" PRIu64 ", 1: %" PRIu64 ", 2: %" PRIu64 ", 3: %" PRIu64
               ", more: %" PRIu64 "\n",
               "", t.lost_by_one_mutant[0], t.lost_by_one_mutant[1], t.lost_by_one_mutant[2], t.lost_by_one_mutant[3],

@@ -55,8 +55,27 @@ heard = [0, 4, 26, 27, 30, 31, 75, 76, 77, 105, 111, 253]  # by the link
 for part in range(2):  # full of a payload that reads as numbers
     frames = (struct.pack("<BBHBB15f", 4, 4, rows.index(i), 60, i, *[0.5] * 15) for i in heard[part::2])
     save("mavlink", f"script_messages{part}", b"\x01" + b"".join(frames))
+def signed_beat(sequence, time):  # the script asks for a good signature (32), how: version 2, signed, own length
+    return struct.pack("<BBHBB", 4, 2 | 4 | 32, rows.index(0), 9, sequence) + bytes(9) + struct.pack("<H", time)
+
+
+save("mavlink", "script_signed", b"\x01" + signed_beat(0, 2000) + signed_beat(1, 2001) + signed_beat(2, 2001) + signed_beat(3, 3000))
 ask = bytes([1]) + struct.pack("<I", 7_000_000) + b"\x02"
 save("mavlink", "script_clock", b"\x01" + (ask + struct.pack("<BBHB", 4, 0, rows.index(111), 0) + struct.pack("<qq", 10**12, 7_000_000)) * 4)
+
+# Recorded logs and message descriptions; the first byte: even a log, odd a description
+beats = [frame(2, *HEARTBEAT, bytes(8) + bytes([i + 1]), i) for i in range(4)]
+times = [1_700_000_000_000_000 + 253254 * i for i in range(4)]
+save("mavlink_log", "raw", raw + b"".join(beats))
+save("mavlink_log", "tlog", raw + b"".join(struct.pack(">Q", t) + b for t, b in zip(times, beats)))
+save("mavlink_log", "tlog_low_first", raw + b"".join(struct.pack("<Q", t) + b for t, b in zip(times, beats)))
+save("mavlink_log", "torn", raw + beats[0] + beats[1][:-4] + struct.pack(">Q", times[2]) + beats[2] + beats[3][:7])
+save("mavlink_log", "unknown", raw + beats[0] + frame(2, 20001, 1, b"abc", 1) + beats[2])
+save("mavlink_log", "signed_cut", raw + frame(2, *HEARTBEAT, bytes(9), 0, signed=True) + frame(2, *HEARTBEAT, bytes(9), 1, signed=True)[:-5] + beats[2])
+save("mavlink_log", "dataflash", raw + b"\xa3\x95\x80\x80")
+field = '{"name":"%s","type":"%s","offset":%d,"array_length":%d,"extension":%s}'
+fields = ",".join([field % ("a", "double", 0, 0, "false"), field % ("b", "int16_t", 8, 2, "false"), field % ("c", "char", 12, 4, "true")])
+save("mavlink_log", "description", b"\x01" + ('{"messages":[{"id":1,"name":"A","crc_extra":2,"min_length":12,"max_length":16,"fields":[%s]}]}' % fields).encode())
 
 # Configurations: each section of ours alone, and the whole without its comments
 

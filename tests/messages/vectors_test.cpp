@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cstring>
+#include <numeric>
 
 #include "messages/checksum.h"
 #include "messages/mavlink_frame.h"
@@ -229,27 +230,33 @@ TEST(Vectors, DistanceSensor) {
   expect_vector(16, m, "fd0e00001001bf840000401f00000a00f4017b00040019ff2e50");
 }
 
+/// Key bytes 00 ... 1f; link 3, timestamp 0x112233445566.
 TEST(Vectors, SignedHeartbeat) {
   const std::string hex = "fd0901000901bf0000000000000012080004039de0036655443322115145f78df360";
-  Encoder encoder(1, 191);
-  encoder.set_sequence(9);
+  SigningKey key;
+  std::iota(key.bytes.begin(), key.bytes.end(), std::uint8_t{0});
+  SigningClock clock(0x112233445566);
   std::array<std::uint8_t, kMaxFrame> out{};
-  const auto sign = [](std::span<const std::uint8_t> covered, std::uint8_t* six) noexcept {
-    EXPECT_EQ(covered.size(), 21u + 7u);
-    const auto hash = from_hex("5145f78df360");  // SHA-256 of key bytes 00 ... 1f and `covered`, computed elsewhere
-    std::copy(hash.begin(), hash.end(), six);
-  };
-  const std::size_t n = encoder.encode_signed(onboard_heartbeat(), 3, 0x112233445566, sign, out);
+  FrameSigner signer(key, clock, 3);
+  Encoder encoder(1, 191);
+  encoder.sign_with(signer);
+  encoder.set_sequence(9);
+  const std::size_t n = encoder.encode(onboard_heartbeat(), out);
   EXPECT_EQ(to_hex({out.data(), n}), hex);
 
+  SigningClock receiver(0x112233445566);
+  SignatureCheck check(key, receiver, true);
   Parser parser;
+  parser.check_signatures(check);
   parser.feed(from_hex(hex), [&](const Frame& frame) noexcept {
     EXPECT_TRUE(frame.is_signed);
+    EXPECT_TRUE(frame.is_verified);
     EXPECT_EQ(to_hex(frame.signature), "036655443322115145f78df360");
     EXPECT_EQ(to_hex(frame.wire), hex);
     EXPECT_EQ(frame.as<Heartbeat>().type, mav_type::kOnboardController);
   });
   EXPECT_EQ(parser.counts().signed_frames, 1u);
+  EXPECT_EQ(check.counts().verified, 1u);
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <fftw3.h>
+#include <nettle/sha2.h>
 #include <poll.h>
 #include <sched.h>
 #include <signal.h>
@@ -51,5 +52,10 @@ int getrusage(int, rusage*) noexcept WASP_ASSUMED;
 // plans without; tests/vision/fft_test.cpp counts). The planner, which allocates and locks, is not in this list.
 void fftwf_execute(const fftwf_plan) WASP_ASSUMED;
 void fftwf_execute_dft(const fftwf_plan, fftwf_complex*, fftwf_complex*) WASP_ASSUMED;
+
+// SHA-256 of a signed line: arithmetic on a context of the caller's, no heap (nettle's sha256.c).
+void nettle_sha256_init(sha256_ctx*) WASP_ASSUMED;
+void nettle_sha256_update(sha256_ctx*, size_t, const uint8_t*) WASP_ASSUMED;
+void nettle_sha256_digest(sha256_ctx*, size_t, uint8_t*) WASP_ASSUMED;
 
 }  // extern "C"

@@ -13,7 +13,7 @@ folder=${2:-${XDG_CACHE_HOME:-${HOME:-/tmp}/.cache}/wasp/rt_guest/$arch}
 guest_packages=(busybox-static stress-ng)
 case $arch in
   arm64) guest_packages+=(libc6-dev libeigen3-dev libfftw3-dev libhwy-dev libpng-dev libtoml11-dev libcli11-dev
-                          libfmt-dev nlohmann-json3-dev) ;;
+                          libfmt-dev nlohmann-json3-dev nettle-dev) ;;
   amd64) ;;
   *) echo "fetch.sh: no architecture '$arch' here; arm64 or amd64" >&2; exit 2 ;;
 esac

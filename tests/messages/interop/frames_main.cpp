@@ -1,9 +1,11 @@
 // Our half of the comparison with node-mavlink. One JSON line per frame: id, name, sequence, hex, fields.
-//   wasp_interop_frames write SEED COUNT   COUNT frames of every message with random fields, and one all-zero
-//   wasp_interop_frames read               decodes frames given as hex lines and encodes them again
+//   wasp_interop_frames write SEED COUNT [KEY]   COUNT frames of every message with random fields, and one all-zero
+//   wasp_interop_frames read [KEY]               decodes frames given as hex lines and encodes them again
+// With KEY (64 hexadecimal digits) what is written is signed, and what is read must be.
 #include <cmath>
 #include <iostream>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <random>
 #include <string>
 #include <type_traits>
@@ -70,9 +72,26 @@ json as_json(const std::array<char, N>& text) {
   return std::string(text.data(), strnlen(text.data(), N));
 }
 
+/// What stands on both sides of a signed line.
+struct Signing {
+  explicit Signing(const std::string& digits) : key(key_of(digits)) {}
+  static SigningKey key_of(const std::string& digits) {
+    SigningKey key;
+    const auto bytes = test::from_hex(digits);
+    std::copy_n(bytes.begin(), std::min(bytes.size(), key.bytes.size()), key.bytes.begin());
+    return key;
+  }
+  SigningKey key;
+  SigningClock clock{1'000'000'000};
+  FrameSigner signer{key, clock, 5};
+  SigningClock receiver{0};
+  SignatureCheck check{key, receiver, true};
+};
+
 template <class M>
-void print(const M& message, std::uint8_t system, std::uint8_t component, std::uint8_t sequence) {
+void print(const M& message, std::uint8_t system, std::uint8_t component, std::uint8_t sequence, Signing* signing) {
   Encoder encoder(system, component);
+  if (signing != nullptr) encoder.sign_with(signing->signer);
   encoder.set_sequence(sequence);
   std::array<std::uint8_t, kMaxFrame> out{};
   const std::size_t n = encoder.encode(message, out);
@@ -88,25 +107,26 @@ void print(const M& message, std::uint8_t system, std::uint8_t component, std::u
             << '\n';
 }
 
-void write(std::uint64_t seed, int count) {
+void write(std::uint64_t seed, int count, Signing* signing) {
   Random random(seed);
   std::uint8_t sequence = 0;
   for_each_message([&]<class M>() {
-    print(M{}, 1, 191, sequence++);
+    print(M{}, 1, 191, sequence++, signing);
     for (int i = 0; i < count; ++i) {
       M message;
       M::for_each_field(message, [&](const char*, std::size_t, auto& field, bool) { fill(field, random); });
-      print(message, 1, 191, sequence++);
+      print(message, 1, 191, sequence++, signing);
     }
   });
 }
 
-void read() {
+void read(Signing* signing) {
   Parser parser;
+  if (signing != nullptr) parser.check_signatures(signing->check);
   for (std::string line; std::getline(std::cin, line);) {
     parser.feed(test::from_hex(line), [&](const Frame& frame) noexcept {
       for_each_message([&]<class M>() {
-        if (frame.is<M>()) print(frame.as<M>(), frame.system_id, frame.component_id, frame.sequence);
+        if (frame.is<M>()) print(frame.as<M>(), frame.system_id, frame.component_id, frame.sequence, nullptr);
       });
     });
   }
@@ -117,12 +137,16 @@ void read() {
 
 int main(int argc, char** argv) {
   const std::string mode = argc > 1 ? argv[1] : "";
-  if (mode == "read" && argc == 2) {
-    wasp::mavlink::read();
-  } else if (mode == "write" && argc == 4) {
-    wasp::mavlink::write(std::stoull(argv[2]), std::stoi(argv[3]));
+  const int plain = mode == "read" ? 2 : 4;
+  std::optional<wasp::mavlink::Signing> signing;
+  if (argc == plain + 1) signing.emplace(argv[plain]);
+  wasp::mavlink::Signing* with = signing ? &*signing : nullptr;
+  if (mode == "read" && argc <= 3) {
+    wasp::mavlink::read(with);
+  } else if (mode == "write" && (argc == 4 || argc == 5)) {
+    wasp::mavlink::write(std::stoull(argv[2]), std::stoi(argv[3]), with);
   } else {
-    std::cerr << "usage: wasp_interop_frames read | write SEED COUNT\n";
+    std::cerr << "usage: wasp_interop_frames read [KEY] | write SEED COUNT [KEY]\n";
     return 2;
   }
 }

@@ -2,7 +2,8 @@
 //   ours -> theirs: our frames pass their parser, decode to the fields we wrote, and encode to the same bytes;
 //   theirs -> ours: their frames pass our parser, decode to the fields they wrote, and encode to the same bytes.
 // One difference is known and handled by name: node-mavlink sends an all-zero payload with length 0 where the rule
-// (never below 1) asks for one zero byte. Everything else counts as a failure.
+// (never below 1) asks for one zero byte. Everything else counts as a failure. The same signed: each side verifies the
+// other's signatures, and refuses them under another key.
 // usage: node interop.cjs FOLDER_OF_NODE_MODULES PATH_OF_WASP_INTEROP_FRAMES [SEED] [COUNT]
 const path = require("path");
 const { execFileSync } = require("child_process");
@@ -11,8 +12,10 @@ const [, , modules, program, seedText = "1", countText = "40"] = process.argv;
 const load = (name) => require(path.join(path.resolve(modules), "node_modules", name));
 const mappings = load("mavlink-mappings");
 const { MavLinkProtocolV1, MavLinkProtocolV2, MavLinkPacketSplitter, MavLinkPacketParser } = load("node-mavlink");
-const registry = { ...mappings.minimal.REGISTRY, ...mappings.standard.REGISTRY, ...mappings.common.REGISTRY };
+const dialects = [mappings.minimal, mappings.standard, mappings.common, mappings.ardupilotmega];
+const registry = Object.assign({}, ...dialects.map((dialect) => dialect.REGISTRY));
 const seed = Number(seedText), count = Number(countText);
+const key = Buffer.from(Array.from({ length: 32 }, (_, i) => i)), otherKey = Buffer.alloc(32, 7);
 const v2 = new MavLinkProtocolV2(1, 191), v1 = new MavLinkProtocolV1(1, 191);
 
 let failures = 0;
@@ -172,20 +175,48 @@ function compareDecoded(sent, got, what) {
   });
 }
 
-/** Their SHA-256 over the published signed frame, which the unit tests only copy. */
-function signature() {
-  const frame = Buffer.from("fd0901000901bf0000000000000012080004039de0036655443322115145f78df360", "hex");
-  const key = Buffer.from(Array.from({ length: 32 }, (_, i) => i));
-  expect(v2.signature(frame, v2.header(frame)).matches(key), "signature of the published frame");
+/** Our signed frames pass their parser, and their SHA-256 finds our signatures right; under another key it does not. */
+async function oursSigned() {
+  const frames = run(["write", String(seed), "3", key.toString("hex")]).filter((f) => registry[f.id]);
+  const packets = await splitByThem(frames.map((f) => Buffer.from(f.hex, "hex")));
+  expect(packets.length === frames.length, `signed: their parser took ${packets.length} of ${frames.length} frames`);
+  let last = 0;
+  for (const packet of packets) {
+    expect(packet.signature && packet.signature.matches(key), `signature of ours, id ${packet.header.msgid}`);
+    expect(!packet.signature.matches(otherKey), `signature of ours under another key, id ${packet.header.msgid}`);
+    expect(packet.signature.timestamp > last, "timestamps rise");
+    last = packet.signature.timestamp;
+  }
+  return packets.length;
+}
+
+/** Their signed frames pass our check, and decode to what they wrote; unsigned ones and those of another key do not. */
+function theirsSigned(ids) {
+  const signing = new MavLinkProtocolV2(1, 191, MavLinkProtocolV2.IFLAG_SIGNED);
+  const sent = [];
+  for (const id of ids) {
+    const Message = registry[id], message = randomMessage(Message, false), sequence = sent.length & 255;
+    const want = byTheRule(v2.serialize(message, sequence), Message).toString("hex");
+    const plain = signing.serialize(message, sequence);
+    sent.push({ Message, message, want, plain, frame: signing.sign(plain, 9, key, Date.now() + sent.length) });
+  }
+  const lines = (frames) => frames.map((f) => f.toString("hex")).join("\n") + "\n";
+  compareDecoded(sent, run(["read", key.toString("hex")], lines(sent.map((s) => s.frame))), "signed by them:");
+  const wrong = sent.map((s, i) => signing.sign(s.plain, 9, otherKey, Date.now() + 1e6 + i));
+  expect(run(["read", key.toString("hex")], lines(wrong)).length === 0, "we took frames of another key");
+  const unsigned = sent.map((s) => Buffer.from(s.want, "hex"));
+  expect(run(["read", key.toString("hex")], lines(unsigned)).length === 0, "we took unsigned frames");
+  return sent.length;
 }
 
 (async () => {
   const ours = await oursToTheirs();
   const theirs = theirsToOurs(ours.ids);
   const version1 = theirsToOursVersion1(ours.ids);
-  signature();
+  const signedOurs = await oursSigned(), signedTheirs = theirsSigned(ours.ids.filter((id) => id !== 109));
   console.log(`messages both know: ${ours.ids.length}; only ours: ${ours.unknown.join(" ") || "none"}`);
   console.log(`frames ours -> theirs: ${ours.frames}; theirs -> ours: ${theirs}; theirs in version 1: ${version1}`);
+  console.log(`signed frames ours -> theirs: ${signedOurs}; theirs -> ours: ${signedTheirs}, as many refused of another key`);
   console.log(`all-zero payloads they sent with length 0 (known difference): ${emptyPayloads}`);
   console.log(failures === 0 ? "every byte and every field agrees" : `${failures} differences`);
   process.exit(failures === 0 ? 0 : 1);
