@@ -33,6 +33,7 @@ constexpr const char* kUsage =
     "  world    make and look at simulated worlds, VRML97 files\n"
     "  top      live rates, ages and latencies of a running flight, read-only\n"
     "  record   log a running flight, read-only\n"
+    "  recording what a folder of recorded data is, and what is wrong with it\n"
     "  report   make report.html of a logged flight\n"
     "  doctor   find out by doing whether this machine can fly real time, and what would change that\n"
     "  eval     run one vision kernel over a folder of recordings\n"

@@ -31,8 +31,9 @@ FlowFileInfo read_header(std::ifstream& in, const std::filesystem::path& file) {
 }
 
 std::ifstream open(const std::filesystem::path& file) {
+  if (!std::filesystem::is_regular_file(file)) throw std::runtime_error(file.string() + ": not a regular file");
   std::ifstream in(file, std::ios::binary);
-  if (!std::filesystem::is_regular_file(file) || !in) throw std::runtime_error(file.string() + ": cannot be read");
+  if (!in) throw std::runtime_error(file.string() + ": cannot be read");
   return in;
 }
 

@@ -82,6 +82,17 @@ void copy_pixels(const Image<T>& image, std::span<T> out, const fs::path& file) 
 
 }  // namespace
 
+namespace {
+
+/// Depth and grey of some layouts are counted apart; a frame's number must rise from entry to entry.
+void number_anew_if_needed(std::vector<ListedFrame>& frames) {
+  const auto falls = [](const ListedFrame& a, const ListedFrame& b) { return b.sequence <= a.sequence; };
+  if (std::adjacent_find(frames.begin(), frames.end(), falls) == frames.end()) return;
+  for (std::size_t i = 0; i < frames.size(); ++i) frames[i].sequence = static_cast<std::uint32_t>(i);
+}
+
+}  // namespace
+
 struct RecordingBuilder {
   Recording recording;
 
@@ -100,6 +111,7 @@ struct RecordingBuilder {
     }
     std::erase_if(frames, [](const ListedFrame& frame) { return frame.any_file().empty(); });
     drop_unordered(frames, recording.problems_);
+    number_anew_if_needed(frames);
     recording.depth_size_ = depth_size, recording.gray_size_ = gray_size;
     if (!frames.empty()) recording.begins_at_ns_ = frames.front().time_ns;
     for (ListedFrame& frame : frames)

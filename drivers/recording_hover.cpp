@@ -120,6 +120,7 @@ std::optional<Listing> list_hover(const fs::path& folder, const Names& names) {
   listing.motion.poses = std::move(capture.poses);
   listing.motion.poses.level = true;
   listing.motion.poses.R_sensor_cam = R_body_cam();
+  listing.motion.poses.floor_z_m = 0.013;  // the data's README
   return listing;
 }
 

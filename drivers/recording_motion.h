@@ -39,6 +39,8 @@ struct PoseStream {
   bool level = false;  ///< the world's z axis is known to point up
   std::vector<PoseSample> samples{};
   std::optional<Eigen::Matrix3d> R_sensor_cam{};  ///< nullopt: the recording is silent
+  /// The camera is known to look down at a level floor, which has this z in the world [m].
+  std::optional<double> floor_z_m{};
 };
 
 struct RecordingMotion {

@@ -1,6 +1,6 @@
 // TUM RGB-D (Sturm et al., IROS 2012) and wasp's own recordings, which are of the same layout: rgb.txt and depth.txt name
 // the images, groundtruth.txt has camera poses by motion capture (tx ty tz qx qy qz qw, world z up), accelerometer.txt
-// three numbers a row. camera.toml is wasp's.
+// three numbers a row. camera.toml is wasp's, and so is imu.csv, in the folder or in log/ beside it.
 #include <charconv>
 
 #include "drivers/motion_tables.h"
@@ -30,9 +30,16 @@ void note_camera(std::string_view comment, Listing& listing) {
   listing.notes.push_back("intrinsics: those published for freiburg" + std::to_string(number) + ", named in the index");
 }
 
-void read_motion(const std::filesystem::path& folder, Listing& listing) {
-  listing.motion.inertial.R_cam_imu = std::nullopt;  // of the Kinect's accelerometer the benchmark says nothing
-  read_inertial(folder / "accelerometer.txt", {TimeUnit::kSeconds, -1, 1}, listing.motion.inertial, listing.problems);
+/// `wasp`: a recording of ours, with the log of the inertial samples (body axes) in the folder or beside it.
+void read_motion(const std::filesystem::path& folder, bool wasp, Listing& listing) {
+  // Of the Kinect's accelerometer the benchmark says nothing: its axes stay unknown.
+  InertialStream& inertial = listing.motion.inertial;
+  read_inertial(folder / "accelerometer.txt", {TimeUnit::kSeconds, -1, 1}, inertial, listing.problems);
+  for (const auto& log : {folder / "imu.csv", folder / ".." / "log" / "imu.csv"})
+    if (inertial.samples.empty() && wasp) read_inertial(log, {TimeUnit::kNanoseconds, 6, 3}, inertial, listing.problems);
+  if (inertial.has_gyro && listing.pitch_down)
+    inertial.R_cam_imu =
+        R_body_cam_from_pitch_down(*listing.pitch_down).transpose().cast<double>();
   PoseStream& poses = listing.motion.poses;
   read_poses(folder / "groundtruth.txt", {TimeUnit::kSeconds, 1, 4, QuaternionOrder::kXyzw}, poses, listing.problems);
   poses.level = true;
@@ -49,9 +56,10 @@ std::optional<Listing> list_tum(const std::filesystem::path& folder, const Names
   std::vector<ListedFrame> depth, gray;
   if (contains(names, "depth.txt")) depth = read_index(folder / "depth.txt", true, listing.problems, comment);
   if (contains(names, "rgb.txt")) gray = read_index(folder / "rgb.txt", false, listing.problems, comment);
-  if (contains(names, "camera.toml")) read_camera_toml(folder / "camera.toml", listing);
+  const bool wasp = contains(names, "camera.toml");
+  if (wasp) read_camera_toml(folder / "camera.toml", listing);
   listing.frames = pair_frames(depth, gray, kPairTolerance);
-  read_motion(folder, listing);
+  read_motion(folder, wasp, listing);
   return listing;
 }
 

@@ -29,6 +29,7 @@ std::string stripped(std::string text) {
 
 /// Every "key: value"; a list may go over several lines. "data" is that of T_BS, the only matrix.
 std::map<std::string, Value> values_of(const std::filesystem::path& file) {
+  if (!std::filesystem::is_regular_file(file)) throw std::runtime_error(file.string() + ": not a regular file");
   std::ifstream in(file);
   if (!in) throw std::runtime_error(file.string() + ": cannot be read");
   std::map<std::string, Value> values;

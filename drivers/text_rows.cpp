@@ -45,8 +45,10 @@ bool has_exponent(std::string_view text) { return text.find_first_of("eE") != st
 
 void visit_rows(const std::filesystem::path& file, const std::function<void(const TextRow&)>& visit,
                 const std::function<void(std::string_view)>& comment) {
-  std::ifstream in(file, std::ios::binary);
-  if (!std::filesystem::is_regular_file(file) || !in) throw std::runtime_error(file.string() + ": cannot be read");
+  const bool regular = std::filesystem::is_regular_file(file);  // first: to open a pipe would wait for its writer
+  std::ifstream in;
+  if (regular) in.open(file, std::ios::binary);
+  if (!regular || !in) throw std::runtime_error(file.string() + ": cannot be read");
   TextRow row;
   std::string line;
   while (std::getline(in, line)) {
