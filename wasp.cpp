@@ -34,6 +34,7 @@ constexpr const char* kUsage =
     "  camera   a real camera (V4L2, IIDC, Kinect) into shared memory; --list shows what is plugged in\n"
     "  top      live rates, ages and latencies of a running flight, read-only\n"
     "  record   log a running flight, read-only\n"
+    "  recording what a folder of recorded data is, and what is wrong with it\n"
     "  report   make report.html of a logged flight\n"
     "  link     who is on a line, what comes how often, and whether that autopilot can be flown by setpoints\n"
     "  doctor   find out by doing whether this machine can fly real time, and what would change that\n"

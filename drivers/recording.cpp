@@ -6,22 +6,60 @@
 #include <stdexcept>
 
 #include "drivers/image_file.h"
-#include "drivers/recording_layouts.h"
+#include "drivers/recording_folder.h"
 
 namespace wasp::drivers {
 namespace {
 
 namespace fs = std::filesystem;
 
-/// Throws unless the file is whole and has the size of its predecessors.
-void check_file(const fs::path& file, Recording::Size& size) {
-  const ImageInfo info = probe_image(file);
-  const Recording::Size found{info.width_px, info.height_px};
-  if (size.width_px == 0) size = found;
-  if (!(found == size))
-    throw std::runtime_error(file.string() + ": " + std::to_string(found.width_px) + "x" +
-                             std::to_string(found.height_px) + " pixels, the frames before it have " +
-                             std::to_string(size.width_px) + "x" + std::to_string(size.height_px));
+/// A file of an entry, once looked at.
+struct Probed {
+  std::optional<Recording::Size> size;  ///< nullopt: there is none, or it is no good
+};
+
+/// Looks at one image; a problem if it is not there or no good.
+Probed probe(const fs::path& file, bool is_depth, const std::string& origin, RecordingProblems& problems) {
+  if (file.empty()) return {};
+  const std::string named = " (named in " + origin + ")";
+  try {
+    const ImageInfo info = probe_image(file);
+    if (is_depth && (info.bits != 16 || info.colour))
+      throw std::runtime_error(file.string() + ": expected a 16-bit grey image (depth)");
+    return {Recording::Size{info.width_px, info.height_px}};
+  } catch (const std::exception& error) {
+    const ProblemKind kind = fs::exists(file) ? ProblemKind::kDamaged : ProblemKind::kMissing;
+    problems.add(kind, file.parent_path(), error.what() + named);
+    return {};
+  }
+}
+
+/// The size that most have; of equally many, that of the first.
+Recording::Size usual_size(const std::vector<Probed>& files) {
+  Recording::Size best;
+  std::size_t most = 0;
+  std::vector<std::pair<Recording::Size, std::size_t>> counts;
+  for (const Probed& p : files) {
+    if (!p.size) continue;
+    auto found = std::find_if(counts.begin(), counts.end(), [&](const auto& c) { return c.first == *p.size; });
+    if (found == counts.end()) found = counts.insert(counts.end(), {*p.size, 0});
+    ++found->second;
+  }
+  for (const auto& [size, count] : counts)
+    if (count > most) best = size, most = count;
+  return best;
+}
+
+/// False, and a problem, for an image of another size than most.
+bool fits(const Probed& probed, Recording::Size usual, const fs::path& file, const std::string& origin,
+          RecordingProblems& problems) {
+  if (!probed.size) return false;
+  if (*probed.size == usual) return true;
+  const auto text = [](Recording::Size s) { return std::to_string(s.width_px) + "x" + std::to_string(s.height_px); };
+  problems.add(ProblemKind::kOtherSize, file.parent_path(),
+               file.string() + ": " + text(*probed.size) + " pixels, most of its kind have " + text(usual) +
+                   " (named in " + origin + ")");
+  return false;
 }
 
 /// The same lens seen with another pixel count.
@@ -44,28 +82,42 @@ void copy_pixels(const Image<T>& image, std::span<T> out, const fs::path& file) 
 
 }  // namespace
 
+namespace {
+
+/// Depth and grey of some layouts are counted apart; a frame's number must rise from entry to entry.
+void number_anew_if_needed(std::vector<ListedFrame>& frames) {
+  const auto falls = [](const ListedFrame& a, const ListedFrame& b) { return b.sequence <= a.sequence; };
+  if (std::adjacent_find(frames.begin(), frames.end(), falls) == frames.end()) return;
+  for (std::size_t i = 0; i < frames.size(); ++i) frames[i].sequence = static_cast<std::uint32_t>(i);
+}
+
+}  // namespace
+
 struct RecordingBuilder {
   Recording recording;
 
-  void add(const ListedFrame& frame, TimeNs& first_ns) {
-    const fs::path& any = frame.depth_file.empty() ? frame.gray_file : frame.depth_file;
-    auto& entries = recording.entries_;
-    if (entries.empty()) first_ns = frame.time_ns;
-    const DurationNs offset_ns = frame.time_ns - first_ns;
-    if (!entries.empty() && offset_ns <= entries.back().offset_ns)
-      throw std::runtime_error(any.string() + ": its time is not after the frame before it");
-    if (!frame.depth_file.empty()) check_file(frame.depth_file, recording.depth_size_);
-    if (!frame.gray_file.empty()) check_file(frame.gray_file, recording.gray_size_);
-    entries.push_back({offset_ns, frame.sequence, frame.depth_file, frame.gray_file});
-  }
-
-  void add_all(const std::vector<ListedFrame>& frames) {
-    TimeNs first_ns = 0;
-    for (const ListedFrame& frame : frames) try {
-        add(frame, first_ns);
-      } catch (const std::exception& error) {
-        recording.problems_.push_back(std::string(error.what()) + " (named in " + frame.origin + ")");
-      }
+  /// Keeps of every frame what is whole and of the usual size, then of the frames those whose times rise.
+  void add_all(std::vector<ListedFrame> frames) {
+    std::vector<Probed> depth, gray;
+    for (const ListedFrame& frame : frames) {
+      depth.push_back(probe(frame.depth_file, true, frame.origin, recording.problems_));
+      gray.push_back(probe(frame.gray_file, false, frame.origin, recording.problems_));
+    }
+    const Recording::Size depth_size = usual_size(depth), gray_size = usual_size(gray);
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+      ListedFrame& frame = frames[i];
+      if (!fits(depth[i], depth_size, frame.depth_file, frame.origin, recording.problems_)) frame.depth_file.clear();
+      if (!fits(gray[i], gray_size, frame.gray_file, frame.origin, recording.problems_)) frame.gray_file.clear();
+    }
+    std::erase_if(frames, [](const ListedFrame& frame) { return frame.any_file().empty(); });
+    drop_unordered(frames, recording.problems_);
+    number_anew_if_needed(frames);
+    recording.depth_size_ = depth_size, recording.gray_size_ = gray_size;
+    if (!frames.empty()) recording.begins_at_ns_ = frames.front().time_ns;
+    for (ListedFrame& frame : frames)
+      recording.entries_.push_back({frame.time_ns - recording.begins_at_ns_, frame.sequence,
+                                    std::move(frame.depth_file), std::move(frame.gray_file),
+                                    frame.stamped_ns.value_or(frame.time_ns)});
   }
 
   void set_camera(const Listing& listing) {
@@ -88,10 +140,15 @@ Recording Recording::open(const fs::path& folder) {
   builder.recording.folder_ = folder;
   builder.recording.layout_ = listing.layout;
   builder.recording.problems_ = std::move(listing.problems);
-  builder.add_all(listing.frames);
-  if (builder.recording.entries_.empty())
+  builder.recording.motion_ = std::move(listing.motion);
+  builder.recording.notes_ = std::move(listing.notes);
+  builder.recording.true_flows_ = std::move(listing.true_flows);
+  builder.add_all(std::move(listing.frames));
+  if (builder.recording.entries_.empty()) {
+    const auto problems = builder.recording.problems();
     throw std::runtime_error(folder.string() + ": no usable frame" +
-                             (builder.recording.problems_.empty() ? "" : "; first: " + builder.recording.problems_[0]));
+                             (problems.empty() ? "" : "; first: " + problems[0]));
+  }
   builder.set_camera(listing);
   return std::move(builder.recording);
 }

@@ -11,6 +11,8 @@
 #include <string>
 #include <vector>
 
+#include "drivers/recording_motion.h"
+#include "drivers/recording_problems.h"
 #include "types/camera.h"
 #include "types/time.h"
 
@@ -21,6 +23,7 @@ struct RecordingEntry {
   DurationNs offset_ns = 0;  ///< since the first entry; strictly rising
   std::uint32_t sequence = 0;
   std::filesystem::path depth_file, gray_file;  ///< empty when the entry has none
+  TimeNs stamped_ns = 0;  ///< by the recorder, in the clock of motion(); a layout may know a better time for the offset
 
   [[nodiscard]] bool has_depth() const { return !depth_file.empty(); }
   [[nodiscard]] bool has_gray() const { return !gray_file.empty(); }
@@ -40,8 +43,19 @@ class Recording {
   [[nodiscard]] std::optional<Radians> pitch_down() const { return pitch_down_; }
   /// Intrinsics, mount and lever arm; an unknown mount counts as kAssumedPitchDown.
   [[nodiscard]] const CameraGeometry& geometry() const { return geometry_; }
-  /// One line for every entry that was skipped: missing, truncated, out of order, of another size.
-  [[nodiscard]] const std::vector<std::string>& problems() const { return problems_; }
+  /// What was skipped and why: missing, truncated, out of order, of another size. Lines of a kind in a file beyond the
+  /// first twenty are told as a number.
+  [[nodiscard]] std::vector<std::string> problems() const { return problems_.lines(); }
+  [[nodiscard]] const RecordingProblems& problem_counts() const { return problems_; }
+  /// Inertial samples and poses beside the frames; empty streams where there are none.
+  [[nodiscard]] const RecordingMotion& motion() const { return motion_; }
+  /// Instant of the first entry in the clock of motion().
+  [[nodiscard]] TimeNs begins_at_ns() const { return begins_at_ns_; }
+  [[nodiscard]] TimeNs time_ns(const RecordingEntry& entry) const { return begins_at_ns_ + entry.offset_ns; }
+  /// What was assumed where the recording is silent.
+  [[nodiscard]] const std::vector<std::string>& notes() const { return notes_; }
+  /// Dense true flow beside the frames (.flo).
+  [[nodiscard]] const std::vector<std::filesystem::path>& true_flows() const { return true_flows_; }
 
   /// Pixel size shared by all depth (grey) files; 0 x 0 when there are none.
   struct Size {
@@ -65,7 +79,11 @@ class Recording {
   std::filesystem::path folder_;
   std::string layout_;
   std::vector<RecordingEntry> entries_;
-  std::vector<std::string> problems_;
+  RecordingProblems problems_;
+  RecordingMotion motion_;
+  TimeNs begins_at_ns_ = 0;
+  std::vector<std::string> notes_;
+  std::vector<std::filesystem::path> true_flows_;
   CameraGeometry geometry_;
   std::optional<Radians> pitch_down_;
   double nominal_rate_hz_ = 30.0;

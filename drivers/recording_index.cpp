@@ -2,30 +2,17 @@
 #include "drivers/recording_index.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
-#include <fstream>
+#include <cstdlib>
 #include <limits>
-#include <sstream>
 #include <stdexcept>
 
+#include "drivers/recording_folder.h"
+#include "drivers/text_rows.h"
 #include "drivers/toml_text.h"
 
 namespace wasp::drivers {
 namespace {
-
-constexpr TimeNs kLatest = INT64_MAX / 2;  ///< the year 2116: differences of two instants up to it fit
-
-/// Decimal seconds to nanoseconds without passing through a double, which holds epoch times to 0.2 us only.
-bool parse_seconds(const std::string& text, TimeNs& out) {
-  const std::size_t dot = text.find('.');
-  std::string fraction = dot == std::string::npos ? "" : text.substr(dot + 1);
-  if (fraction.size() > 9) fraction.resize(9);
-  fraction.append(9 - fraction.size(), '0');
-  const std::string digits = text.substr(0, dot) + fraction;
-  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), out);
-  return error == std::errc{} && end == digits.data() + digits.size() && dot != 0 && out >= 0 && out <= kLatest;
-}
 
 double number(const toml::value& value, const std::string& key, const std::filesystem::path& file, double low,
               double high) {
@@ -67,56 +54,57 @@ float* distortion_of(Intrinsics& k, const std::string& key) {
 
 }  // namespace
 
-std::optional<std::uint32_t> trailing_number(const std::filesystem::path& file) {
-  std::string name = file.filename().string();
-  name = name.substr(0, name.find('.'));
-  const std::size_t last = name.find_last_not_of("0123456789");
-  const std::string digits = last == std::string::npos ? name : name.substr(last + 1);
-  std::uint32_t value = 0;
-  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
-  if (error != std::errc{} || end != digits.data() + digits.size()) return std::nullopt;
-  return value;
-}
-
-std::vector<ListedFrame> read_index(const std::filesystem::path& index, bool is_depth,
-                                    std::vector<std::string>& problems) {
-  std::ifstream in(index);
-  if (!in) throw std::runtime_error(index.string() + ": cannot open");
+std::vector<ListedFrame> read_index(const std::filesystem::path& index, bool is_depth, RecordingProblems& problems,
+                                    const std::function<void(std::string_view)>& comment) {
   std::vector<ListedFrame> frames;
-  std::string line;
-  for (int number = 1; std::getline(in, line); ++number) {
-    line = line.substr(0, line.find('#'));
-    std::istringstream fields(line);
-    std::string seconds, name, more;
-    if (!(fields >> seconds)) continue;
-    const std::string origin = index.string() + ":" + std::to_string(number);
+  const auto read = [&](const TextRow& row) {
     ListedFrame frame;
-    if (!(fields >> name) || fields >> more || !parse_seconds(seconds, frame.time_ns)) {
-      problems.push_back(origin + ": expected \"<seconds> <file>\"");
-      continue;
-    }
-    const std::filesystem::path file = index.parent_path() / name;
+    if (row.fields.size() != 2 || !parse_seconds(row.fields[0], frame.time_ns) || row.fields[1].empty())
+      return problems.add_line(ProblemKind::kUnreadable, index, row.line, "expected \"<seconds> <file>\"");
+    const std::filesystem::path file = index.parent_path() / row.fields[1];
     const bool numbered = file.filename().string().starts_with("frame-");
     const auto fallback = static_cast<std::uint32_t>(frames.size());
     frame.sequence = numbered ? trailing_number(file).value_or(fallback) : fallback;
     (is_depth ? frame.depth_file : frame.gray_file) = file;
-    frame.origin = origin;
+    frame.origin = index.string() + ":" + std::to_string(row.line);
     frames.push_back(std::move(frame));
-  }
+  };
+  visit_rows(index, read, comment);
+  if (!frames.empty() && frames[0].any_file().parent_path() != index.parent_path())
+    tell_unlisted(frames[0].any_file().parent_path(), frames, problems);
+  drop_unordered(frames, problems);
   return frames;
 }
+
+namespace {
+
+/// Index of the frame nearest in time; `frames` is not empty and rises.
+std::size_t nearest(const std::vector<ListedFrame>& frames, TimeNs time_ns) {
+  const auto after = std::lower_bound(frames.begin(), frames.end(), time_ns,
+                                      [](const ListedFrame& f, TimeNs t) { return f.time_ns < t; });
+  const auto at = static_cast<std::size_t>(after - frames.begin());
+  if (at == 0) return 0;
+  if (at == frames.size()) return at - 1;
+  return frames[at].time_ns - time_ns < time_ns - frames[at - 1].time_ns ? at : at - 1;
+}
+
+}  // namespace
 
 std::vector<ListedFrame> pair_frames(const std::vector<ListedFrame>& depth, const std::vector<ListedFrame>& gray,
                                      DurationNs tolerance_ns) {
   std::vector<ListedFrame> out;
-  std::size_t g = 0;
-  for (const ListedFrame& d : depth) {
-    for (; g < gray.size() && gray[g].time_ns < d.time_ns - tolerance_ns; ++g) out.push_back(gray[g]);
-    ListedFrame joined = d;
-    if (g < gray.size() && gray[g].time_ns <= d.time_ns + tolerance_ns) joined.gray_file = gray[g++].gray_file;
-    out.push_back(std::move(joined));
+  std::vector<bool> taken(gray.size());
+  for (std::size_t d = 0; d < depth.size(); ++d) {
+    out.push_back(depth[d]);
+    if (gray.empty()) continue;
+    const std::size_t g = nearest(gray, depth[d].time_ns);
+    if (std::abs(gray[g].time_ns - depth[d].time_ns) > tolerance_ns || nearest(depth, gray[g].time_ns) != d) continue;
+    out.back().gray_file = gray[g].gray_file;
+    taken[g] = true;
   }
-  out.insert(out.end(), gray.begin() + static_cast<std::ptrdiff_t>(g), gray.end());
+  for (std::size_t g = 0; g < gray.size(); ++g)
+    if (!taken[g]) out.push_back(gray[g]);
+  std::stable_sort(out.begin(), out.end(), [](const auto& a, const auto& b) { return a.time_ns < b.time_ns; });
   return out;
 }
 

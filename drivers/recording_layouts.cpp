@@ -4,59 +4,19 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
-#include <cmath>
-#include <fstream>
 #include <map>
-#include <numbers>
-#include <sstream>
+#include <set>
 #include <stdexcept>
 
+#include "drivers/flow_file.h"
 #include "drivers/image_file.h"
+#include "drivers/recording_folder.h"
 #include "drivers/recording_index.h"
 
 namespace wasp::drivers {
 namespace {
 
 namespace fs = std::filesystem;
-using Names = std::vector<std::string>;  // of the regular files in the folder, sorted
-
-constexpr double kLongestClip_s = 1e6;
-constexpr DurationNs kPairTolerance = 17 * kMillisecond;  // half a period of a 30 Hz camera
-
-Names file_names(const fs::path& folder) {
-  Names names;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder))
-    if (entry.is_regular_file()) names.push_back(entry.path().filename().string());
-  std::sort(names.begin(), names.end());
-  return names;
-}
-
-bool contains(const Names& names, const std::string& name) {
-  return std::binary_search(names.begin(), names.end(), name);
-}
-
-Intrinsics pinhole(int width_px, int height_px, float fx_px, float fy_px, float cx_px, float cy_px) {
-  return {.width_px = width_px, .height_px = height_px, .fx_px = fx_px, .fy_px = fy_px, .cx_px = cx_px, .cy_px = cy_px};
-}
-
-TimeNs at_rate(std::uint32_t index, double rate_hz) { return std::llround(index * 1e9 / rate_hz); }
-
-/// Files matching prefix + digits + suffix, by number. `prefix` may be empty.
-std::map<std::uint32_t, std::string> numbered(const Names& names, const std::string& prefix,
-                                              const std::string& suffix) {
-  std::map<std::uint32_t, std::string> out;
-  for (const std::string& name : names) {
-    if (!name.starts_with(prefix) || !name.ends_with(suffix) || name.size() <= prefix.size() + suffix.size()) continue;
-    const char* begin = name.data() + prefix.size();
-    const char* end = name.data() + name.size() - suffix.size();
-    std::uint32_t number = 0;
-    const auto [stop, error] = std::from_chars(begin, end, number);
-    if (error == std::errc{} && stop == end) out.emplace(number, name);
-  }
-  return out;
-}
-
 /// Frames on the nominal grid, timed from the first number.
 std::vector<ListedFrame> depth_frames(const fs::path& folder, const std::map<std::uint32_t, std::string>& files,
                                       double rate_hz) {
@@ -64,27 +24,6 @@ std::vector<ListedFrame> depth_frames(const fs::path& folder, const std::map<std
   for (const auto& [number, name] : files)
     frames.push_back({at_rate(number - files.begin()->first, rate_hz), number, folder / name, {}, name});
   return frames;
-}
-
-std::optional<Listing> list_tum(const fs::path& folder, const Names& names) {
-  if (!contains(names, "depth.txt") && !contains(names, "rgb.txt")) return std::nullopt;
-  Listing listing{.layout = "tum"};
-  listing.depth_units_per_m = 5000.0;
-  if (contains(names, "camera.toml")) read_camera_toml(folder / "camera.toml", listing);
-  std::vector<ListedFrame> depth, gray;
-  if (contains(names, "depth.txt")) depth = read_index(folder / "depth.txt", true, listing.problems);
-  if (contains(names, "rgb.txt")) gray = read_index(folder / "rgb.txt", false, listing.problems);
-  listing.frames = pair_frames(depth, gray, kPairTolerance);
-  return listing;
-}
-
-std::optional<Listing> list_7scenes(const fs::path& folder, const Names& names) {
-  const auto files = numbered(names, "frame-", ".depth.png");
-  if (files.empty()) return std::nullopt;
-  Listing listing{.layout = "7scenes"};
-  listing.intrinsics = pinhole(640, 480, 585.f, 585.f, 320.f, 240.f);
-  listing.frames = depth_frames(folder, files, listing.nominal_rate_hz);
-  return listing;
 }
 
 std::optional<Listing> list_tum_pair(const fs::path& folder, const Names& names) {
@@ -127,95 +66,28 @@ std::optional<Listing> list_named_depth(const fs::path& folder, const Names& nam
   return listing;
 }
 
-/// t_s by frame number from gt_per_frame.csv (columns frame, t_s, ...).
-std::map<std::uint32_t, TimeNs> frame_times(const fs::path& file, std::vector<std::string>& problems) {
-  std::map<std::uint32_t, TimeNs> times;
-  std::ifstream in(file);
-  std::string line;
-  std::getline(in, line);
-  if (!line.starts_with("frame,t_s")) {
-    problems.push_back(file.string() + ":1: expected columns frame,t_s,...");
-    return times;
-  }
-  for (int number = 2; std::getline(in, line); ++number) {
-    std::istringstream fields(line);
-    std::uint32_t frame = 0;
-    char comma = 0;
-    double t_s = 0;
-    if (fields >> frame >> comma >> t_s && comma == ',' && t_s >= 0 && t_s <= kLongestClip_s)
-      times[frame] = std::llround(t_s * 1e9);
-    else
-      problems.push_back(file.string() + ":" + std::to_string(number) + ": expected <frame>,<seconds>,...");
-  }
-  return times;
-}
-
-/// A downward 320x240 camera at 60 Hz. The table's times are those of the motion capture, which hears of some frames
-/// late (steps of 4 to 32 ms): they are used where they rise, else the frame sits on the 60 Hz grid.
-std::optional<Listing> list_hover(const fs::path& folder, const Names& names) {
-  const auto files = numbered(names, "test", ".png");
-  if (files.empty() || !contains(names, "gt_per_frame.csv")) return std::nullopt;
-  Listing listing{.layout = "hover_mocap"};
-  listing.intrinsics = pinhole(320, 240, 390.f, 390.f, 159.5f, 119.5f);
-  listing.pitch_down = Radians{std::numbers::pi / 2};
-  listing.nominal_rate_hz = 60.0;
-  const auto times = frame_times(folder / "gt_per_frame.csv", listing.problems);
-  const bool complete = std::all_of(files.begin(), files.end(), [&](const auto& f) { return times.contains(f.first); });
-  for (const auto& [number, name] : files) {
-    const TimeNs time_ns = complete ? times.at(number) : at_rate(number - files.begin()->first, 60.0);
-    listing.frames.push_back({time_ns, number, {}, folder / name, name});
-  }
-  return listing;
-}
-
-/// A folder of such clips, played one after the other in order of their frame numbers, a tenth of a second apart.
-std::optional<Listing> list_hover_clips(const fs::path& folder, const Names&) {
-  std::map<std::uint32_t, Listing> clips;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder))
-    if (entry.is_directory())
-      if (auto clip = list_hover(entry.path(), file_names(entry.path())))
-        clips.emplace(clip->frames.front().sequence, *std::move(clip));
-  if (clips.empty()) return std::nullopt;
-  Listing all = clips.begin()->second;
-  all.layout = "hover_mocap_clips";
-  for (auto next = std::next(clips.begin()); next != clips.end(); ++next) {
-    const DurationNs shift_ns = all.frames.back().time_ns + 100 * kMillisecond - next->second.frames.front().time_ns;
-    for (ListedFrame frame : next->second.frames) {
-      frame.time_ns += shift_ns;
-      all.frames.push_back(std::move(frame));
-    }
-    all.problems.insert(all.problems.end(), next->second.problems.begin(), next->second.problems.end());
-  }
-  return all;
-}
-
-/// Size and centre of the first usable image; a damaged one is a problem, told when the frame is added.
-void assume_centred(const fs::path& file, Listing& listing) {
-  const ImageInfo info = probe_image(file);
-  listing.intrinsics.width_px = info.width_px;
-  listing.intrinsics.height_px = info.height_px;
-  listing.intrinsics.cx_px = 0.5f * static_cast<float>(info.width_px - 1);
-  listing.intrinsics.cy_px = 0.5f * static_cast<float>(info.height_px - 1);
-}
-
-/// EuRoC ASL: grey PNGs named by their time in nanoseconds.
-std::optional<Listing> list_asl(const fs::path& folder, const Names& names) {
-  constexpr std::size_t kDigits = 16;  // a time in nanoseconds since 1970 has 19
-  Listing listing{.layout = "asl"};
-  listing.nominal_rate_hz = 20.0;
+/// Middlebury: frame10.png, frame11.png and flow10.flo, the true flow from the first to the second. Each .flo is held
+/// against the frames of its number and the next.
+void add_true_flows(const fs::path& folder, const Names& names, Listing& listing) {
+  std::set<std::uint32_t> numbers;
+  for (const ListedFrame& frame : listing.frames) numbers.insert(frame.sequence);
   for (const std::string& name : names) {
-    const std::size_t digits = name.find_first_not_of("0123456789");
-    if (digits == std::string::npos || digits < kDigits || digits > 19 || name.substr(digits) != ".png") continue;
-    const auto index = static_cast<std::uint32_t>(listing.frames.size());
-    TimeNs time_ns = 0;
-    if (std::from_chars(name.data(), name.data() + digits, time_ns).ec != std::errc{} || time_ns > INT64_MAX / 2)
-      listing.problems.push_back((folder / name).string() + ": no time in nanoseconds");
-    else
-      listing.frames.push_back({time_ns, index, {}, folder / name, name});
+    if (!name.ends_with(".flo")) continue;
+    const auto number = trailing_number(name);
+    try {
+      const FlowFileInfo info = probe_flow(folder / name);
+      if (!number || !numbers.contains(*number) || !numbers.contains(*number + 1))
+        listing.problems.add(ProblemKind::kAlone, folder,
+                             (folder / name).string() + ": no frames of its number and the next beside it");
+      else if (info.width_px != listing.intrinsics.width_px || info.height_px != listing.intrinsics.height_px)
+        listing.problems.add(ProblemKind::kOtherSize, folder, (folder / name).string() + ": not of the frames' size");
+      else
+        listing.true_flows.push_back(folder / name);
+    } catch (const std::runtime_error& error) {
+      listing.problems.add(ProblemKind::kDamaged, folder, error.what());
+    }
   }
-  if (listing.frames.empty()) return std::nullopt;
-  assume_centred(listing.frames.front().gray_file, listing);
-  return listing;
+  if (!listing.true_flows.empty() && listing.frames.size() == 2) listing.layout = "middlebury";
 }
 
 /// The fallback: PNGs whose names end in a number, of the stem that most of them share; 16-bit grey counts as depth.
@@ -238,30 +110,30 @@ std::optional<Listing> list_numbered_png(const fs::path& folder, const Names& na
       listing.frames.push_back(
           {time_ns, number, depth ? folder / name : fs::path{}, depth ? fs::path{} : folder / name, name});
     } catch (const std::runtime_error& error) {
-      listing.problems.emplace_back(error.what());
+      listing.problems.add(ProblemKind::kDamaged, folder, error.what());
     }
   }
+  add_true_flows(folder, names, listing);
   return listing;
 }
 
-constexpr std::array kLayouts = {&list_tum,   &list_7scenes,     &list_tum_pair, &list_pgm,         &list_named_depth,
-                                 &list_hover, &list_hover_clips, &list_asl,      &list_numbered_png};
+constexpr std::array kLayouts = {&list_tum,   &list_7scenes,     &list_tum_pair, &list_pgm,      &list_named_depth,
+                                 &list_hover, &list_hover_clips, &list_rawseeds, &list_asl,      &list_numbered_png};
 
-/// A folder of clips is not a recording; say which of its sub-folders are.
+/// A folder of recordings is none itself; say which of its sub-folders are.
 [[noreturn]] void refuse(const fs::path& folder) {
-  Names clips;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
-    if (!entry.is_directory()) continue;
-    const Names names = file_names(entry.path());
-    if (contains(names, "gt_per_frame.csv") || contains(names, "depth.txt") || contains(names, "rgb.txt"))
-      clips.push_back(entry.path().filename().string());
-  }
-  std::sort(clips.begin(), clips.end());
-  if (clips.empty())
-    throw std::runtime_error(folder.string() + ": no recording here (no depth.txt, frame-*.depth.png, depth_*.pgm, " +
-                             "*_depth.png, test*.png or numbered PNG files)");
   std::string list;
-  for (const std::string& clip : clips) list += (list.empty() ? "" : ", ") + clip;
+  for (const std::string& name : folder_names(folder)) {
+    const Names names = file_names(folder / name);
+    const bool one = contains(names, "gt_per_frame.csv") || contains(names, "depth.txt") || contains(names, "rgb.txt") ||
+                     contains(names, "data.csv") || fs::exists(folder / name / "mav0") ||
+                     std::any_of(names.begin(), names.end(), [](const std::string& n) { return n.ends_with(".png"); });
+    if (one) list += (list.empty() ? "" : ", ") + name;
+  }
+  if (list.empty())
+    throw std::runtime_error(folder.string() + ": no recording here (no depth.txt, rgb.txt, mav0/cam0/data.csv, " +
+                             "frame-*.depth.png, FRONTAL_*.png, depth_*.pgm, *_depth.png, test*.png or numbered PNG " +
+                             "files)");
   throw std::runtime_error(folder.string() + ": holds several recordings; name one of them: " + list);
 }
 

@@ -23,6 +23,7 @@
 #include "scheduling/flight_regions.h"
 #include "scheduling/guard_page.h"
 #include "scheduling/link_loop.h"
+#include "scheduling/recorded_motion.h"
 #include "scheduling/replay_camera.h"
 #include "scheduling/supervisor.h"
 #include "shm/bus_guard.h"
@@ -169,10 +170,12 @@ class Flight {
     }
     auto recording = drivers::Recording::open(options_.replay);
     for (const auto& problem : recording.problems()) log("recording: " + problem);
-    recording_problems_ = recording.problems().size();
+    recording_problems_ = recording.problem_counts().total();
     config_.camera = recording.geometry();
     frame_period_ns_ = from_seconds(1.0 / recording.nominal_rate_hz());
     scripts_ = load_replay_script(options_.replay);
+    if (scripts_.empty()) recorded_motion_ = script_of(recording);
+    if (!recorded_motion_.empty()) log("recording: attitude from " + recording.motion().poses.source);
     second_lap_ = ReplayCamera::lap_sequence(recording);
     allow_for_a_slow_recording();
     const double seconds = options_.seconds > 0 ? options_.seconds : to_seconds(ReplayCamera::lap_ns(recording));
@@ -306,6 +309,9 @@ class Flight {
       if (const auto script = scripts_.find(row.name); script != scripts_.end()) {
         w.script = &script->second;
         w.script_ends_at = second_lap_;
+      } else if (!recorded_motion_.empty()) {
+        w.script = &recorded_motion_;
+        w.script_ends_at = second_lap_;
       }
     }
     const CameraGeometry& camera = looks_down(row.stream) ? config_.camera_down.geometry : config_.camera;
@@ -408,6 +414,7 @@ class Flight {
   drivers::AutopilotLink autopilot_;
   std::unique_ptr<shm::Region> camera_;
   std::map<std::string, BehaviourScript> scripts_;
+  BehaviourScript recorded_motion_;  ///< for every behaviour, where the recording is not one of ours
   std::uint32_t second_lap_ = 0;
   std::size_t recording_problems_ = 0;
   std::unique_ptr<ReplayCamera> replay_;

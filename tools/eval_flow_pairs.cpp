@@ -8,6 +8,7 @@
 #include <opencv2/imgcodecs.hpp>
 #endif
 
+#include "drivers/flow_file.h"
 #include "tools/eval_flow_pairs.h"
 
 namespace wasp::tools {
@@ -30,26 +31,8 @@ bool is_mask(const std::string& prefix) {
 }
 
 DenseFlow read_flo(const fs::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  float tag = 0;
-  std::array<std::int32_t, 2> size{};
-  in.read(reinterpret_cast<char*>(&tag), sizeof tag);
-  in.read(reinterpret_cast<char*>(size.data()), sizeof size);
-  const bool good = in && tag == 202021.25f && size[0] > 0 && size[1] > 0 && size[0] <= drivers::kMaxImageSide &&
-                    size[1] <= drivers::kMaxImageSide;
-  if (!good) throw std::runtime_error(file.string() + ": not a .flo file");
-  const auto count = static_cast<std::size_t>(size[0]) * static_cast<std::size_t>(size[1]);
-  std::vector<float> uv(2 * count);
-  in.read(reinterpret_cast<char*>(uv.data()), static_cast<std::streamsize>(uv.size() * sizeof(float)));
-  if (!in) throw std::runtime_error(file.string() + ": cut short");
-  DenseFlow truth{size[0], size[1], std::vector<float>(count), std::vector<float>(count),
-                  std::vector<std::uint8_t>(count)};
-  for (std::size_t i = 0; i < count; ++i) {
-    truth.u[i] = uv[2 * i];
-    truth.v[i] = uv[2 * i + 1];
-    truth.known[i] = std::abs(truth.u[i]) < 1e9f && std::abs(truth.v[i]) < 1e9f ? 1 : 0;
-  }
-  return truth;
+  drivers::FlowImage flow = drivers::load_flow(file);
+  return {flow.width_px, flow.height_px, std::move(flow.u_px), std::move(flow.v_px), std::move(flow.known)};
 }
 
 /// Clears `known` where the mask says so.

@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "drivers/recording_index.h"
+#include "drivers/recording_folder.h"
 
 namespace wasp::tools {
 namespace {

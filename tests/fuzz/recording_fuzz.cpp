@@ -35,7 +35,23 @@ constexpr std::array kNames = {"depth.txt",
                                "9999999999999999999.png",
                                "0001403636579763555.png",
                                "image7.png",
-                               "image8.png"};
+                               "image8.png",
+                               "frame-000000.color.png",
+                               "frame10.png",
+                               "frame11.png",
+                               "FRONTAL_1235604664.906455.png",
+                               "groundtruth.txt",
+                               "accelerometer.txt",
+                               "imu.csv",
+                               "mocap_500hz_raw.csv",
+                               "data.csv",
+                               "sensor.yaml",
+                               "frame-000000.pose.txt",
+                               "frame-000007.pose.txt",
+                               "flow10.flo"};
+
+/// Those that hold text (or bytes); the others hold images.
+bool is_text(std::size_t name) { return name < 4 || name >= 26; }
 
 /// Depth, grey and oddly sized images, and one that is none, as they lie in a file.
 const std::vector<std::vector<std::uint8_t>>& images() {
@@ -62,6 +78,12 @@ const std::vector<std::vector<std::uint8_t>>& images() {
 
 void check(const drivers::Recording& recording) {
   fuzz::require(!recording.entries().empty(), "an open recording has entries");
+  fuzz::require(recording.problems().empty() == (recording.problem_counts().total() == 0), "problems are told and counted");
+  TimeNs before_ns = -1;
+  for (const auto& sample : recording.motion().inertial.samples) {
+    fuzz::require(sample.time_ns > before_ns, "inertial samples are in order of time");
+    before_ns = sample.time_ns;
+  }
   std::vector<std::uint16_t> depth(recording.depth_size().pixels());
   std::vector<std::uint8_t> gray(recording.gray_size().pixels());
   DurationNs last = -1;
@@ -86,7 +108,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   folder.clear();
   for (int files = 0; !in.empty() && files < 6; ++files) {
     const auto name = in.take<std::uint8_t>(), what = in.take<std::uint8_t>();
-    const bool text = name % kNames.size() < 4;
+    const bool text = is_text(name % kNames.size());
     folder.write(kNames[name % kNames.size()],
                  text ? in.take_bytes(what * 4u) : std::span<const std::uint8_t>(images()[what % images().size()]));
   }

@@ -178,6 +178,20 @@ save("recording", "numbered", folder((20, 1), (21, 1)))
 save("recording", "odd_times", folder((3, "frame,t_s,x\n1,-1e300\n2,1e300\n"), (14, 1), (15, 1)))
 save("recording", "far_times", folder((0, "-9223372036.854775808 frame-000000.depth.png\n9223372036.854775807 frame-000007.depth.png"),
                                       (4, 0), (5, 0)))
+save("recording", "tum_motion", folder((1, "# freiburg2\r\n1.0 test1.png\r\n1.1 test002.png"), (14, 1), (15, 1), (2, CAMERA),
+                                       (26, "1.0 1 2 3 0 0 0 1\n1.1 1 2 3 0 0 0.0998 0.995\n1.05 0 0 0 0 0 0 2"),
+                                       (28, "exposed_at_ns,a\n1000000000,0,0,0,0,-9.8,0.1,0.2,0.3\n1005000000,0,0,0,0,-9.8,0.1,0.2,0.3")))
+save("recording", "accelerometer", folder((1, "1.0 test1.png"), (14, 1), (27, "# t a a a\n1.0 0.1 -9.8 0.2\n1.0 0 0 0\n0.5 x 1 1")))
+save("recording", "7scenes_poses", folder((4, 0), (5, 0), (22, 1), (32, "1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1"), (33, "1 0 0\n")))
+save("recording", "euroc", folder((17, 1), (30, "#timestamp [ns],filename\n1403636579763555584,1403636579763555584.png\n1,2,3"),
+                                  (31, "T_BS:\n  data: [0, -1, 0, 0, 1, 0, 0, 0,\n 0, 0, 1, 0, 0, 0, 0, 1]\nrate_hz: 20\nresolution: [4, 3]\n"
+                                       "camera_model: pinhole\nintrinsics: [3, 3, 1, 1] # fu\ndistortion_model: radtan\n"
+                                       "distortion_coefficients: [0.1, 0, 0, 0]")))
+save("recording", "rawseeds", folder((25, 1)))
+save("recording", "capture", folder((3, "frame,t_s,x\n1,0.01\n2,0.03\n1,0.02\n9,1"), (14, 1), (15, 1),
+                                    (29, "time_s,latest_image_frame,X,Y,Z,qx,qy,qz\n0.01,0,0,0,1,0,0,0.1\n0.02,1,0,0,1,0,0,0.1\n0.03,2,0,0,1,9,0,0")))
+FLO = struct.pack("<fii", 202021.25, 4, 3) + struct.pack("<24f", *[0.5] * 24)
+save("recording", "middlebury", folder((23, 1), (24, 1)) + bytes([34, len(FLO) // 4]) + FLO)
 save("recording", "elsewhere", folder((1, "1.0 /dev/null\n2.0 ../x.png\n3.0 .")))
 
 # Shared memory: changes (u16 place, u8 length, bytes) to a good region; the first byte: another length in 128ths
