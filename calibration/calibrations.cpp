@@ -5,6 +5,8 @@
 #include "calibration/calibrate_baro.h"
 #include "calibration/calibrate_camera.h"
 #include "calibration/calibrate_gyro.h"
+#include "calibration/calibrate_kinect_depth.h"
+#include "calibration/calibrate_kinect_pair.h"
 #include "calibration/calibrate_vector_sensor.h"
 
 namespace wasp::calibration {
@@ -17,6 +19,9 @@ std::span<const Calibration> calibrations() {
       Calibration{"baro", "barometer: a line through readings at known heights", &prepare_baro},
       Calibration{"camera", "intrinsics and distortion, pinhole or fisheye, from images of a chessboard",
                   &prepare_camera},
+      Calibration{"kinect-depth", "a Kinect's raw values to depth, from a wall at known distances", &prepare_kinect_depth},
+      Calibration{"kinect-extrinsics", "a Kinect's two lenses and how they stand to each other, from pairs of images",
+                  &prepare_kinect_pair},
   };
   return kCalibrations;
 }

@@ -31,18 +31,6 @@ std::array<int, ImageCoverage::kColumns * ImageCoverage::kRows> corners_in_cells
   return counts;
 }
 
-TomlSection flight_section(const BoardViews& views, const LensFit& fit, const std::string& name) {
-  TomlSection t(name);
-  t.whole("width_px", views.image.width).whole("height_px", views.image.height);
-  t.number("fx_px", fit.K(0, 0)).number("fy_px", fit.K(1, 1)).number("cx_px", fit.K(0, 2)).number("cy_px", fit.K(1, 2));
-  const bool fisheye = fit.model.kind == LensKind::kFisheye;
-  const char* kOrder[] = {"k1", "k2", "p1", "p2", "k3"};
-  for (std::size_t i = 0; i < 5; ++i) t.number(kOrder[i], fisheye ? 0.0 : fit.distortion[i]);
-  t.text("lens", fisheye ? "fisheye" : "pinhole");
-  t.numbers("fisheye_k", fisheye ? fit.distortion : std::vector<double>(4, 0.0));
-  return t;
-}
-
 /// The uncertainty of the projection at the centres of the cells; NaN where the lens has no ray.
 std::vector<double> projection_sigmas(const BoardViews& views, const LensFit& fit) {
   std::vector<double> out;
@@ -151,10 +139,22 @@ ImageCoverage image_coverage(const BoardViews& views, const LensFit& fit) {
   return out;
 }
 
+TomlSection camera_section(const BoardViews& views, const LensFit& fit, const std::string& name) {
+  TomlSection t(name);
+  t.whole("width_px", views.image.width).whole("height_px", views.image.height);
+  t.number("fx_px", fit.K(0, 0)).number("fy_px", fit.K(1, 1)).number("cx_px", fit.K(0, 2)).number("cy_px", fit.K(1, 2));
+  const bool fisheye = fit.model.kind == LensKind::kFisheye;
+  const char* kOrder[] = {"k1", "k2", "p1", "p2", "k3"};
+  for (std::size_t i = 0; i < 5; ++i) t.number(kOrder[i], fisheye ? 0.0 : fit.distortion[i]);
+  t.text("lens", fisheye ? "fisheye" : "pinhole");
+  t.numbers("fisheye_k", fisheye ? fit.distortion : std::vector<double>(4, 0.0));
+  return t;
+}
+
 Solution camera_solution(const BoardViews& views, const LensFit& fit, const CameraEvidence& e,
                          const std::string& source) {
   Solution out;
-  out.flight.push_back(flight_section(views, fit, e.section));
+  out.flight.push_back(camera_section(views, fit, e.section));
   out.evidence = evidence_of(views, fit, e);
   out.source = source;
   out.samples = views.views.size() * static_cast<std::size_t>(views.board.area());

@@ -27,6 +27,9 @@ struct CameraEvidence {
   std::vector<std::string> notes;
 };
 
+/// Size and lens as keys of the section `name`.
+TomlSection camera_section(const BoardViews& views, const LensFit& fit, const std::string& name);
+
 Solution camera_solution(const BoardViews& views, const LensFit& fit, const CameraEvidence& evidence,
                          const std::string& source);
 
