@@ -33,8 +33,8 @@ std::optional<Pose> stereo(const BoardPairs& pairs, const std::vector<cv::Point3
   } catch (const cv::Exception&) {
     return std::nullopt;
   }
-  pose.R = cv::Matx33d(R);
-  pose.T = cv::Vec3d(T);
+  pose.R = cv::Matx33d(R.ptr<double>());
+  pose.T = cv::Vec3d(T.ptr<double>());
   for (int i = 0; i < errors.rows; ++i)
     pose.pair_rms.push_back(std::sqrt((errors.at<double>(i, 0) * errors.at<double>(i, 0) +
                                        errors.at<double>(i, 1) * errors.at<double>(i, 1)) / 2));
