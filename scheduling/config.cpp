@@ -76,6 +76,10 @@ void read_camera_settings(TomlTable& t, drivers::CameraSettings& s) {
   t.text_value("trigger", s.trigger, {"off", "external"});
   t.number("buffers", s.buffers, 2, 32);
   t.number("readout_us", s.readout_us, -1, 1e6);
+  t.text_value("depth_mode", s.depth_mode, {"raw", "registered", "mm"});
+  t.text_value("depth_model", s.depth_model, {"two-gaussians", "tangent", "linear"});
+  t.numbers("depth_coefficients", s.depth_coefficients, -1e300, 1e300);
+  read_vector(t, "depth_range_m", s.depth_range_m, 0.1, 20);
 }
 
 void read_camera(TomlTable t, Config& c) {
@@ -242,6 +246,7 @@ void settle(Config& c) {
 void read_document(TomlTable root, Config& c, bool foreign_behaviours) {
   read_run(root.table("run"), c);
   read_autopilot(root.table("autopilot"), c.autopilot);
+  root.table("calibration");  // the evidence that `wasp calibrate` writes beside its values: for people
   read_camera(root.table("camera"), c);
   read_camera_down(root.table("camera_down"), c.camera_down);
   read_mission(root.table("mission"), c);
