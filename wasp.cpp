@@ -35,6 +35,7 @@ constexpr const char* kUsage =
     "  record   log a running flight, read-only\n"
     "  report   make report.html of a logged flight\n"
     "  doctor   find out by doing whether this machine can fly real time, and what would change that\n"
+    "  calibrate accelerometer, magnetometer, ... from recorded data: TOML for the flight, or a refusal\n"
     "  eval     run one vision kernel over a folder of recordings\n"
     "  iceoryx  export topics to iceoryx, or import a camera from it\n"
     "  bench    benchmarks: latency, ipc, vision, micro\n"
