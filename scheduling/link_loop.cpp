@@ -267,11 +267,6 @@ void LinkLoop::on_heartbeat(const drivers::AutopilotStatus& status) WASP_REALTIM
   setup_.on_heartbeat(status);
 }
 
-void LinkLoop::on_frame(const mavlink::Frame& frame) WASP_REALTIME {
-  if (setup_.on_frame(frame)) return;
-  autopilot_.refuse_command(frame, *this);
-}
-
 void LinkLoop::on_ack(std::uint16_t command, std::uint8_t result) WASP_REALTIME {
   using namespace mavlink;  // NOLINT: its enumerations
   if (result == mav_result::kAccepted || result == mav_result::kInProgress) return;
@@ -292,13 +287,17 @@ void LinkLoop::on_statustext(std::uint8_t, std::string_view text) WASP_REALTIME 
   events_.say(received_at_ns_, "autopilot: ", text);
 }
 
-/// What the link does not handle itself: where the vehicle is, and what others ask of us.
+/// What the link does not handle itself: where the vehicle is, what it says of itself, and what others ask of us.
 void LinkLoop::on_frame(const mavlink::Frame& frame) WASP_REALTIME {
   const auto& self = autopilot_.identity();
   const bool autopilot =
       frame.system_id == self.autopilot_system_id && frame.component_id == self.autopilot_component_id;
   if (autopilot && frame.is<mavlink::LocalPositionNed>()) note_position(frame.as<mavlink::LocalPositionNed>());
-  if (services_.telemetry != nullptr) services_.telemetry->receive(frame, received_at_ns_);
+  if (setup_.on_frame(frame)) return;
+  if (services_.telemetry != nullptr)
+    services_.telemetry->receive(frame, received_at_ns_);
+  else
+    autopilot_.refuse_command(frame, *this);
 }
 
 void LinkLoop::note_position(const mavlink::LocalPositionNed& m) WASP_REALTIME {
