@@ -36,7 +36,7 @@ Hover fly(const TemporaryFolder& out, int attempt) {
       << kCamera << "[run]\nenforce_real_time = false\nadmission = \"off\"\n[autopilot]\nendpoint = \"serial:" << first
       << ":921600\"\n[mission]\nheights_m = [0.6]\nseconds = [12.0]\n"
       << "[behaviour.edge_altitude]\nenabled = false\n";
-  Running a(
+  Program a(
       {program_path("wasp-sim"), "--instance", vehicle, "--no-camera", "--tty-link", first, "--second-link", second});
   Hover hover;
   if (!eventually([&] { return std::filesystem::exists(second); })) return hover;
