@@ -2,17 +2,16 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <cmath>
-#include <numbers>
+#include <memory>
 
-#include "tools/report_plot.h"
+#include "calibration/picture.h"
 
 namespace wasp::calibration {
 namespace {
 
 constexpr std::array kColours = {"c0", "c1", "c2", "c3", "c4", "c5"};
-
-double degrees(double rad) { return rad * 180 / std::numbers::pi; }
 
 TomlSection evidence_of(const DelayFit& fit, const TurnSource& source) {
   TomlSection t;
@@ -32,17 +31,17 @@ TomlSection evidence_of(const DelayFit& fit, const TurnSource& source) {
 }
 
 Picture profile_picture(const DelayFit& fit) {
-  tools::Plot plot{.title = "delay", .x_label = "delay of the image [ms]", .y_label = "log likelihood over no relation"};
+  tools::Plot plot = labelled_plot("delay", "delay of the image [ms]", "log likelihood over no relation");
   tools::Curve curve{"", {"c0", "thick"}, {}};
   for (std::size_t i = 0; i < fit.profile.size(); ++i) curve.series.add(1e3 * fit.profile_delay_s[i], fit.profile[i]);
   plot.curves.push_back(curve);
   plot.marks.push_back({fmt::format("{:.1f} ms", 1e3 * fit.delay_s), 1e3 * fit.delay_s, fit.likelihood});
-  return {"profile", tools::standalone_svg(plot.svg())};
+  return picture("profile", plot);
 }
 
 /// Images against sensor at the found delay, those channels that took part.
 Picture residual_picture(const DelayFit& fit) {
-  tools::Plot plot{.title = "residuals", .x_label = "time [s]", .y_label = "image - sensor [1/s]"};
+  tools::Plot plot = labelled_plot("residuals", "time [s]", "image - sensor [1/s]");
   for (std::size_t a = 0; a < fit.axes.size(); ++a) {
     if (!fit.axes[a].used) continue;
     tools::Curve curve{kChannelNames[a], {kColours[a], "dots"}, {}};
@@ -50,11 +49,11 @@ Picture residual_picture(const DelayFit& fit) {
       curve.series.add(fit.time_s[i], fit.image_radps[a][i] - fit.gyro_radps[a][i]);
     plot.curves.push_back(curve);
   }
-  return {"residuals", tools::standalone_svg(plot.svg())};
+  return picture("residuals", plot);
 }
 
 Picture rates_picture(const DelayFit& fit) {
-  tools::Plot plot{.title = "rates", .x_label = "time [s]", .y_label = "rate [1/s]"};
+  tools::Plot plot = labelled_plot("rates", "time [s]", "rate [1/s]");
   std::size_t best = 0;
   for (std::size_t a = 0; a < fit.axes.size(); ++a)
     if (fit.axes[a].used && fit.axes[a].correlation > fit.axes[best].correlation) best = a;
@@ -64,7 +63,7 @@ Picture rates_picture(const DelayFit& fit) {
     sensor.series.add(fit.time_s[i], fit.gyro_radps[best][i]);
   }
   plot.curves = {sensor, image};
-  return {"rates", tools::standalone_svg(plot.svg())};
+  return picture("rates", plot);
 }
 
 Solution solution_of(const DelayFit& fit, const TurnSource& source, const drivers::Recording& recording) {

@@ -9,9 +9,9 @@
 namespace wasp::calibration {
 
 struct DelayOptions {
-  std::string folder;
+  std::string folder{};
   std::string against = "best";  ///< best | gyro | poses
-  DelayParams fit;
+  DelayParams fit{};
 };
 
 /// Throws Refusal, or std::runtime_error for a folder that is no good.

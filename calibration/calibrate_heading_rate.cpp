@@ -3,10 +3,11 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <memory>
 #include <numbers>
 
 #include "calibration/calibrate_delay.h"
-#include "tools/report_plot.h"
+#include "calibration/picture.h"
 
 namespace wasp::calibration {
 namespace {
@@ -27,22 +28,22 @@ double delay_s(const HeadingRateOptions& options, const drivers::Recording& reco
 }
 
 Picture rates_picture(const HeadingScale& h) {
-  tools::Plot plot{.title = "yaw rate", .x_label = "time [s]", .y_label = "yaw rate [deg/s]"};
+  tools::Plot plot = labelled_plot("yaw rate", "time [s]", "yaw rate [deg/s]");
   tools::Curve known{"sensor", {"c1", "thin"}, {}}, seen{"image, scaled", {"c0", "dots"}, {}};
   for (std::size_t i = 0; i < h.time_s.size(); ++i) {
     known.series.add(h.time_s[i], degrees(h.known_radps[i] - h.bias_radps));
     seen.series.add(h.time_s[i], degrees(h.scale * h.seen_radps[i]));
   }
   plot.curves = {known, seen};
-  return {"rates", tools::standalone_svg(plot.svg())};
+  return picture("rates", plot);
 }
 
 Picture residual_picture(const HeadingScale& h) {
-  tools::Plot plot{.title = "residuals", .x_label = "yaw rate seen [deg/s]", .y_label = "sensor - scaled image [deg/s]"};
+  tools::Plot plot = labelled_plot("residuals", "yaw rate seen [deg/s]", "sensor - scaled image [deg/s]");
   tools::Curve dots{"", {"c0", "dots"}, {}};
   for (std::size_t i = 0; i < h.seen_radps.size(); ++i) dots.series.add(degrees(h.seen_radps[i]), degrees(h.residuals_radps[i]));
   plot.curves = {dots};
-  return {"residuals", tools::standalone_svg(plot.svg())};
+  return picture("residuals", plot);
 }
 
 Solution solution_of(const HeadingScale& h, const TurnSource& source, double delay_ms, const std::string& folder) {
