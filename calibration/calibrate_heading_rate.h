@@ -11,7 +11,7 @@ namespace wasp::calibration {
 
 struct HeadingRateOptions {
   std::string folder{};
-  std::string against = "best";    ///< best | gyro | poses
+  std::string against = "best";      ///< best | gyro | poses
   std::optional<double> delay_ms{};  ///< of the camera; nullopt: found first, by the turns about the optical axis
   HeadingScaleParams fit{};
 };
