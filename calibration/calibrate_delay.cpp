@@ -2,17 +2,16 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <cmath>
-#include <numbers>
+#include <memory>
 
-#include "tools/report_plot.h"
+#include "calibration/picture.h"
 
 namespace wasp::calibration {
 namespace {
 
 constexpr std::array kColours = {"c0", "c1", "c2", "c3", "c4", "c5"};
-
-double degrees(double rad) { return rad * 180 / std::numbers::pi; }
 
 TomlSection evidence_of(const DelayFit& fit, const TurnSource& source) {
   TomlSection t;
@@ -32,17 +31,17 @@ TomlSection evidence_of(const DelayFit& fit, const TurnSource& source) {
 }
 
 Picture profile_picture(const DelayFit& fit) {
-  tools::Plot plot{.title = "delay", .x_label = "delay of the image [ms]", .y_label = "log likelihood over no relation"};
+  tools::Plot plot = labelled_plot("delay", "delay of the image [ms]", "log likelihood over no relation");
   tools::Curve curve{"", {"c0", "thick"}, {}};
   for (std::size_t i = 0; i < fit.profile.size(); ++i) curve.series.add(1e3 * fit.profile_delay_s[i], fit.profile[i]);
   plot.curves.push_back(curve);
   plot.marks.push_back({fmt::format("{:.1f} ms", 1e3 * fit.delay_s), 1e3 * fit.delay_s, fit.likelihood});
-  return {"profile", tools::standalone_svg(plot.svg())};
+  return picture("profile", plot);
 }
 
 /// Images against sensor at the found delay, those channels that took part.
 Picture residual_picture(const DelayFit& fit) {
-  tools::Plot plot{.title = "residuals", .x_label = "time [s]", .y_label = "image - sensor [1/s]"};
+  tools::Plot plot = labelled_plot("residuals", "time [s]", "image - sensor [1/s]");
   for (std::size_t a = 0; a < fit.axes.size(); ++a) {
     if (!fit.axes[a].used) continue;
     tools::Curve curve{kChannelNames[a], {kColours[a], "dots"}, {}};
@@ -50,21 +49,22 @@ Picture residual_picture(const DelayFit& fit) {
       curve.series.add(fit.time_s[i], fit.image_radps[a][i] - fit.gyro_radps[a][i]);
     plot.curves.push_back(curve);
   }
-  return {"residuals", tools::standalone_svg(plot.svg())};
+  return picture("residuals", plot);
 }
 
 Picture rates_picture(const DelayFit& fit) {
-  tools::Plot plot{.title = "rates", .x_label = "time [s]", .y_label = "rate [1/s]"};
+  tools::Plot plot = labelled_plot("rates", "time [s]", "rate [1/s]");
   std::size_t best = 0;
   for (std::size_t a = 0; a < fit.axes.size(); ++a)
     if (fit.axes[a].used && fit.axes[a].correlation > fit.axes[best].correlation) best = a;
-  tools::Curve image{std::string("image, ") + kChannelNames[best], {"c0", "dots"}, {}}, sensor{"sensor at the delay", {"c1", "thin"}, {}};
+  tools::Curve image{std::string("image, ") + kChannelNames[best], {"c0", "dots"}, {}},
+      sensor{"sensor at the delay", {"c1", "thin"}, {}};
   for (std::size_t i = 0; i < fit.image_radps[best].size(); ++i) {
     image.series.add(fit.time_s[i], fit.image_radps[best][i]);
     sensor.series.add(fit.time_s[i], fit.gyro_radps[best][i]);
   }
   plot.curves = {sensor, image};
-  return {"rates", tools::standalone_svg(plot.svg())};
+  return picture("rates", plot);
 }
 
 Solution solution_of(const DelayFit& fit, const TurnSource& source, const drivers::Recording& recording) {
@@ -79,9 +79,12 @@ Solution solution_of(const DelayFit& fit, const TurnSource& source, const driver
     if (fit.axes[a].used) out.residual_rms += fit.axes[a].residual_radps * fit.axes[a].residual_radps, weight += 1;
   if (weight > 0) out.residual_rms = std::sqrt(out.residual_rms / weight);
   if (!source.axes_known())
-    out.notes.emplace_back("the recording does not say how the sensor lies to the camera: all three of its axes were fitted to each of the image's");
+    out.notes.emplace_back(
+        "the recording does not say how the sensor lies to the camera: all three of its axes were fitted to each of "
+        "the image's");
   for (const auto& note : recording.notes()) out.notes.push_back(note);
-  if (fit.delay_s < 0) out.notes.emplace_back("the images are stamped before they were exposed, or the sensor's stamps are late");
+  if (fit.delay_s < 0)
+    out.notes.emplace_back("the images are stamped before they were exposed, or the sensor's stamps are late");
   out.pictures = {profile_picture(fit), rates_picture(fit), residual_picture(fit)};
   return out;
 }
@@ -90,7 +93,8 @@ Solution solution_of(const DelayFit& fit, const TurnSource& source, const driver
 
 TurnSource turn_source_of(const drivers::Recording& recording, const std::string& against) {
   const auto& motion = recording.motion();
-  const bool gyro = motion.inertial.has_gyro && motion.inertial.samples.size() > 2, poses = motion.poses.samples.size() > 4;
+  const bool gyro = motion.inertial.has_gyro && motion.inertial.samples.size() > 2,
+             poses = motion.poses.samples.size() > 4;
   if (against != "poses" && gyro) return TurnSource::from_gyro(motion.inertial);
   if (against != "gyro" && poses) return TurnSource::from_poses(motion.poses);
   throw Refusal(fmt::format("{} ({} layout) holds no {} to hold the images against", recording.folder().string(),
@@ -104,18 +108,22 @@ Solution solve_delay(const DelayOptions& options, ProgressBar& bar) {
   bar.show(0.9, "delay");
   const DelayFit fit = fit_delay(turns, source, options.fit);
   if (!fit.ok())
-    throw Refusal(fit.refusal + fmt::format(" [best {:.1f} ms, sigma {:.1f} ms, {} pairs]", 1e3 * fit.delay_s, 1e3 * fit.sigma_s, fit.frames));
+    throw Refusal(fit.refusal + fmt::format(" [best {:.1f} ms, sigma {:.1f} ms, {} pairs]", 1e3 * fit.delay_s,
+                                            1e3 * fit.sigma_s, fit.frames));
   return solution_of(fit, source, recording);
 }
 
 std::function<Solution(ProgressBar&)> prepare_delay(CLI::App& app) {
   auto options = std::make_shared<DelayOptions>();
-  auto search_ms = std::make_shared<double>(1e3 * options->fit.search_s), sigma_ms = std::make_shared<double>(1e3 * options->fit.max_sigma_s);
-  app.add_option("DIR", options->folder, "recording with grey images and a gyro or true poses (`wasp recording DIR`)")->required();
+  auto search_ms = std::make_shared<double>(1e3 * options->fit.search_s),
+       sigma_ms = std::make_shared<double>(1e3 * options->fit.max_sigma_s);
+  app.add_option("DIR", options->folder, "recording with grey images and a gyro or true poses (`wasp recording DIR`)")
+      ->required();
   app.add_option("--against", options->against, "what to hold the images against: the gyro if there is one, or")
       ->check(CLI::IsMember({"best", "gyro", "poses"}));
   app.add_option("--search-ms", *search_ms, "delays looked at, either way [ms]")->check(CLI::Range(20.0, 2000.0));
-  app.add_option("--max-sigma-ms", *sigma_ms, "refuse an answer less certain than this [ms]")->check(CLI::Range(0.05, 100.0));
+  app.add_option("--max-sigma-ms", *sigma_ms, "refuse an answer less certain than this [ms]")
+      ->check(CLI::Range(0.05, 100.0));
   return [=](ProgressBar& bar) {
     options->fit.search_s = 1e-3 * *search_ms;
     options->fit.max_sigma_s = 1e-3 * *sigma_ms;

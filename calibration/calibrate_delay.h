@@ -1,5 +1,5 @@
-// `wasp calibrate delay DIR`: the delay of a camera's stamps behind the sensors', from a recording with grey images and a
-// gyro or true poses. delay_fit.h has the method. Written as [camera] delay_ms, which whoever writes a live camera's
+// `wasp calibrate delay DIR`: the delay of a camera's stamps behind the sensors', from a recording with grey images and
+// a gyro or true poses. delay_fit.h has the method. Written as [camera] delay_ms, which whoever writes a live camera's
 // frames takes off their stamps.
 #pragma once
 
@@ -9,9 +9,9 @@
 namespace wasp::calibration {
 
 struct DelayOptions {
-  std::string folder;
+  std::string folder{};
   std::string against = "best";  ///< best | gyro | poses
-  DelayParams fit;
+  DelayParams fit{};
 };
 
 /// Throws Refusal, or std::runtime_error for a folder that is no good.

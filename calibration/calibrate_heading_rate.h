@@ -10,10 +10,10 @@
 namespace wasp::calibration {
 
 struct HeadingRateOptions {
-  std::string folder;
-  std::string against = "best";    ///< best | gyro | poses
-  std::optional<double> delay_ms;  ///< of the camera; nullopt: found first, by the turns about the optical axis
-  HeadingScaleParams fit;
+  std::string folder{};
+  std::string against = "best";      ///< best | gyro | poses
+  std::optional<double> delay_ms{};  ///< of the camera; nullopt: found first, by the turns about the optical axis
+  HeadingScaleParams fit{};
 };
 
 /// Throws Refusal, or std::runtime_error for a folder that is no good.

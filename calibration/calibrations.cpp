@@ -4,7 +4,9 @@
 
 #include "calibration/calibrate_baro.h"
 #include "calibration/calibrate_camera.h"
+#include "calibration/calibrate_delay.h"
 #include "calibration/calibrate_gyro.h"
+#include "calibration/calibrate_heading_rate.h"
 #include "calibration/calibrate_kinect_depth.h"
 #include "calibration/calibrate_kinect_pair.h"
 #include "calibration/calibrate_vector_sensor.h"
@@ -22,6 +24,9 @@ std::span<const Calibration> calibrations() {
       Calibration{"kinect-depth", "a Kinect's raw values to depth, from a wall at known distances", &prepare_kinect_depth},
       Calibration{"kinect-extrinsics", "a Kinect's two lenses and how they stand to each other, from pairs of images",
                   &prepare_kinect_pair},
+      Calibration{"delay", "a camera's stamps behind the gyro's, from how both saw the vehicle turn", &prepare_delay},
+      Calibration{"heading-rate", "the heading rate behaviour's scale, from a turntable run under a camera that looks down",
+                  &prepare_heading_rate},
   };
   return kCalibrations;
 }

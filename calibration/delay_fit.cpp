@@ -34,7 +34,8 @@ struct Data {
 Data gather(const std::vector<ImageTurn>& turns, const TurnSource& source, DurationNs reach_ns) {
   std::vector<const ImageTurn*> used;
   for (const ImageTurn& turn : turns)
-    if (turn.valid && (!source.over_floor() || turn.centre.allFinite()) && source.mean_rate(turn.first_ns - reach_ns, turn.second_ns - reach_ns) &&
+    if (turn.valid && (!source.over_floor() || turn.centre.allFinite()) &&
+        source.mean_rate(turn.first_ns - reach_ns, turn.second_ns - reach_ns) &&
         source.mean_rate(turn.first_ns + reach_ns, turn.second_ns + reach_ns) &&
         source.mean_rate(turn.first_ns - reach_ns, turn.second_ns + reach_ns))
       used.push_back(&turn);
@@ -218,8 +219,9 @@ double jackknife(const Data& data, const Profile& profile, const std::vector<Cha
 
 double curvature_sigma(const Profile& profile, const std::vector<Channel>& channels, const Peak& peak) {
   constexpr double kStep = 0.004;
-  const double bend = (profile.at(peak.delay_s - kStep, channels) - 2 * peak.height +
-                       profile.at(peak.delay_s + kStep, channels)) / (kStep * kStep);
+  const double bend =
+      (profile.at(peak.delay_s - kStep, channels) - 2 * peak.height + profile.at(peak.delay_s + kStep, channels)) /
+      (kStep * kStep);
   return bend < 0 ? 1 / std::sqrt(-bend) : 1.0;
 }
 
@@ -247,20 +249,24 @@ AxisFit axis_fit(const Profile& profile, const Channel& c, const MatrixXd& gyro)
 std::string refusal_of(const DelayFit& fit, const DelayParams& p) {
   double turned = 0;
   for (const AxisFit& a : fit.axes) turned = std::max(turned, a.gyro_rms_radps);
-  const std::string moved = fmt::format("the rates vary by {:.2f} deg/s rms about the axis that turns most", degrees(turned));
+  const std::string moved =
+      fmt::format("the rates vary by {:.2f} deg/s rms about the axis that turns most", degrees(turned));
   if (fit.likelihood < p.least_likelihood)
-    return fmt::format("the image's turns do not follow the sensor's at any delay (likelihood {:.1f}, at least {:.0f}); {}: "
-                       "turn the vehicle to and fro, by hand, for ten seconds before a textured scene",
-                       fit.likelihood, p.least_likelihood, moved);
+    return fmt::format(
+        "the image's turns do not follow the sensor's at any delay (likelihood {:.1f}, at least {:.0f}); {}: "
+        "turn the vehicle to and fro, by hand, for ten seconds before a textured scene",
+        fit.likelihood, p.least_likelihood, moved);
   if (std::abs(fit.delay_s) > p.search_s - 2 * kCoarse_s)
-    return fmt::format("the best delay, {:.0f} ms, lies at the edge of the search: widen --search-ms", 1e3 * fit.delay_s);
+    return fmt::format("the best delay, {:.0f} ms, lies at the edge of the search: widen --search-ms",
+                       1e3 * fit.delay_s);
   if (fit.sigma_s > p.max_sigma_s)
-    return fmt::format("the motion determines the delay to {:.1f} ms only (one standard deviation; at most {:.1f}); {} and too "
-                       "evenly: turns that begin and end sharply tell more",
-                       1e3 * fit.sigma_s, 1e3 * p.max_sigma_s, moved);
+    return fmt::format(
+        "the motion determines the delay to {:.1f} ms only (one standard deviation; at most {:.1f}); {} and too "
+        "evenly: turns that begin and end sharply tell more",
+        1e3 * fit.sigma_s, 1e3 * p.max_sigma_s, moved);
   if (fit.lead < p.least_lead)
-    return fmt::format("another delay fits nearly as well (lead {:.1f}, at least {:.0f}): the motion repeats itself", fit.lead,
-                       p.least_lead);
+    return fmt::format("another delay fits nearly as well (lead {:.1f}, at least {:.0f}): the motion repeats itself",
+                       fit.lead, p.least_lead);
   return "";
 }
 
@@ -272,9 +278,10 @@ DelayFit fit_delay(const std::vector<ImageTurn>& turns, const TurnSource& source
   const Data data = gather(turns, source, from_seconds(params.search_s + 0.035));
   fit.frames = static_cast<std::size_t>(data.size());
   if (data.size() < params.least_frames) {
-    fit.refusal = fmt::format("{} pairs of frames have flow and lie within the sensor's record with {:.0f} ms to spare; {} are "
-                              "the least",
-                              data.size(), 1e3 * params.search_s, params.least_frames);
+    fit.refusal = fmt::format(
+        "{} pairs of frames have flow and lie within the sensor's record with {:.0f} ms to spare; {} are "
+        "the least",
+        data.size(), 1e3 * params.search_s, params.least_frames);
     return fit;
   }
   std::vector<double> grid;

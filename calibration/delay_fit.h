@@ -1,8 +1,8 @@
 // The delay between a camera's stamps and a gyro's, from how both saw the vehicle turn. An image stamped s was exposed
 // at s - delay. For every delay the image's rates are regressed on the gyro's mean rates over the same, shifted, frame
-// intervals, axis by axis with a free scale and bias; each axis counts by what is left of it, so that an axis the camera
-// cannot see (or sees travel in) takes no part. The profile is the log likelihood over "no relation", with the number of
-// frames reduced by how much neighbouring residuals agree.
+// intervals, axis by axis with a free scale and bias; each axis counts by what is left of it, so that an axis the
+// camera cannot see (or sees travel in) takes no part. The profile is the log likelihood over "no relation", with the
+// number of frames reduced by how much neighbouring residuals agree.
 //
 // The answer is refused where the profile has no clear peak, a second one as good, or one too flat.
 #pragma once
@@ -28,7 +28,7 @@ struct DelayParams {
 
 /// What can be compared: turns about the camera's axes (right, down, forward), and, over a level floor whose place is
 /// known, what the image's centre does (shift right, shift down, growth).
-inline constexpr std::array<const char*, 6> kChannelNames = {"turn_right", "turn_down",  "turn_forward",
+inline constexpr std::array<const char*, 6> kChannelNames = {"turn_right",  "turn_down",  "turn_forward",
                                                              "shift_right", "shift_down", "growth"};
 using ChannelChoice = std::array<bool, 6>;
 inline constexpr ChannelChoice kAllChannels = {true, true, true, true, true, true};
@@ -36,14 +36,14 @@ inline constexpr ChannelChoice kAllChannels = {true, true, true, true, true, tru
 /// How one of them follows the sensor.
 struct AxisFit {
   bool compared = false;
-  bool used = false;  ///< the relation is credible
+  bool used = false;      ///< the relation is credible
   bool epipolar = false;  ///< which of the two estimates of the image's turn
   double scale = 0;       ///< image over gyro; NaN where the axes of the sensor are not known and three were fitted
   double bias_radps = 0;
   double correlation = 0;  ///< between the image's rates and what the gyro says they are
   double residual_radps = 0;
-  double gyro_rms_radps = 0;  ///< of the variation about its mean
-  double effective_share = 1; ///< of the frames, by the correlation of neighbouring residuals
+  double gyro_rms_radps = 0;   ///< of the variation about its mean
+  double effective_share = 1;  ///< of the frames, by the correlation of neighbouring residuals
 };
 
 struct DelayFit {
@@ -55,7 +55,8 @@ struct DelayFit {
   std::array<AxisFit, 6> axes;
   std::vector<double> profile_delay_s, profile;  ///< the whole search
   std::vector<double> time_s;                    ///< of the pairs, middle, since the first
-  std::array<std::vector<double>, 6> image_radps, gyro_radps;  ///< at the found delay; gyro scaled and biased to the image
+  std::array<std::vector<double>, 6> image_radps,
+      gyro_radps;  ///< at the found delay; gyro scaled and biased to the image
 
   std::string refusal;  ///< why the answer may not be used; empty: it may
   [[nodiscard]] bool ok() const { return refusal.empty(); }

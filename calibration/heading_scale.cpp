@@ -70,7 +70,8 @@ struct Line {
 Line line_through(const VectorXd& seen, const VectorXd& known, const VectorXd& weights) {
   const double n = std::max(weights.sum(), 1.0), mx = weights.dot(seen) / n, my = weights.dot(known) / n;
   const VectorXd x = seen.array() - mx, y = known.array() - my;
-  const double xx = weights.dot(x.cwiseProduct(x)), yy = weights.dot(y.cwiseProduct(y)), xy = weights.dot(x.cwiseProduct(y));
+  const double xx = weights.dot(x.cwiseProduct(x)), yy = weights.dot(y.cwiseProduct(y)),
+               xy = weights.dot(x.cwiseProduct(y));
   Line line;
   if (!(xx > 0 && yy > 0 && xy > 0)) return line;
   line.low = xy / xx, line.high = yy / xy;
@@ -114,24 +115,32 @@ double share_beyond(const VectorXd& rates, double limit_radps, bool positive) {
 }
 
 std::string refusal_of(const HeadingScale& h, const VectorXd& known, const HeadingScaleParams& p) {
-  const double limit = h.rms_radps / 3, right = share_beyond(known, limit, true), left = share_beyond(known, limit, false);
+  const double limit = h.rms_radps / 3, right = share_beyond(known, limit, true),
+               left = share_beyond(known, limit, false);
   if (h.valid_share < p.least_valid)
-    return fmt::format("the floor was followed between {:.0f} % of the frames only (at least {:.0f} %): too little texture, or too fast",
-                       100 * h.valid_share, 100 * p.least_valid);
+    return fmt::format(
+        "the floor was followed between {:.0f} % of the frames only (at least {:.0f} %): too little texture, or too "
+        "fast",
+        100 * h.valid_share, 100 * p.least_valid);
   if (h.rms_radps < p.least_rms_radps)
-    return fmt::format("the yaw rate varies by {:.2f} deg/s rms only; at least {:.1f} are needed: turn both ways, with rests",
-                       degrees(h.rms_radps), degrees(p.least_rms_radps));
+    return fmt::format(
+        "the yaw rate varies by {:.2f} deg/s rms only; at least {:.1f} are needed: turn both ways, with rests",
+        degrees(h.rms_radps), degrees(p.least_rms_radps));
   if (std::min(right, left) < p.least_each_way)
-    return fmt::format("it turned one way: {:.0f} % of the frames to the right, {:.0f} % to the left (at least {:.0f} % each), and "
-                       "a bias of the gyro cannot be told from the scale",
-                       100 * right, 100 * left, 100 * p.least_each_way);
+    return fmt::format(
+        "it turned one way: {:.0f} % of the frames to the right, {:.0f} % to the left (at least {:.0f} % each), and "
+        "a bias of the gyro cannot be told from the scale",
+        100 * right, 100 * left, 100 * p.least_each_way);
   if (h.correlation < p.least_correlation)
-    return fmt::format("seen and known yaw rate correlate by {:.4f} only; at least {:.2f}", h.correlation, p.least_correlation);
+    return fmt::format("seen and known yaw rate correlate by {:.4f} only; at least {:.2f}", h.correlation,
+                       p.least_correlation);
   if (h.sigma > p.most_sigma)
-    return fmt::format("the scale, {:.4f}, is known to {:.4f} only (one standard deviation; at most {:.3f}): turn longer or faster",
-                       h.scale, h.sigma, p.most_sigma);
+    return fmt::format(
+        "the scale, {:.4f}, is known to {:.4f} only (one standard deviation; at most {:.3f}): turn longer or faster",
+        h.scale, h.sigma, p.most_sigma);
   if (!(h.scale >= 0.5 && h.scale <= 2))
-    return fmt::format("a scale of {:.3f} is no scale: camera, lens or axes of the gyro are not what the recording says", h.scale);
+    return fmt::format(
+        "a scale of {:.3f} is no scale: camera, lens or axes of the gyro are not what the recording says", h.scale);
   return "";
 }
 
@@ -145,10 +154,14 @@ std::vector<SeenYaw> seen_yaw(const drivers::Recording& recording, const std::ve
   vision::HeadingRateDown::State state;
   vision::FlowGrid grid(size.width_px, size.height_px, {});
   vision::FlowField flow;
-  std::array<std::vector<std::uint8_t>, 2> pixels{std::vector<std::uint8_t>(size.pixels()), std::vector<std::uint8_t>(size.pixels())};
-  const auto view = [&](std::size_t i) { return GrayView{pixels[i].data(), size.width_px, size.height_px, size.width_px}; };
+  std::array<std::vector<std::uint8_t>, 2> pixels{std::vector<std::uint8_t>(size.pixels()),
+                                                  std::vector<std::uint8_t>(size.pixels())};
+  const auto view = [&](std::size_t i) {
+    return GrayView{pixels[i].data(), size.width_px, size.height_px, size.width_px};
+  };
   const auto attitude = [&](std::size_t i) {
-    return drivers::attitude_of(recording.motion(), params.camera.R_body_cam, recording.time_ns(recording.entries()[i]));
+    return drivers::attitude_of(recording.motion(), params.camera.R_body_cam,
+                                recording.time_ns(recording.entries()[i]));
   };
   std::vector<SeenYaw> seen;
   std::optional<std::size_t> last;
@@ -163,7 +176,8 @@ std::vector<SeenYaw> seen_yaw(const drivers::Recording& recording, const std::ve
     if (last) {
       grid.track(view(1 - now), view(now), flow);
       const auto second = attitude(i);
-      const FlowMessage message = message_of(flow, stamps[*last], stamps[i], params.camera.R_body_cam, attitude(*last), second);
+      const FlowMessage message =
+          message_of(flow, stamps[*last], stamps[i], params.camera.R_body_cam, attitude(*last), second);
       BehaviourInput input;
       input.exposed_at_ns = stamps[i];
       input.flow = &message;
@@ -185,8 +199,8 @@ HeadingScale fit_heading_scale(const std::vector<SeenYaw>& seen, const TurnSourc
   const Series s = gather(seen, source, delay_s);
   h.pairs = s.seen.size();
   if (s.seen.size() < static_cast<std::size_t>(params.least_pairs)) {
-    h.refusal = fmt::format("{} pairs of frames show the floor and lie within the sensor's record; {} are the least", h.pairs,
-                            params.least_pairs);
+    h.refusal = fmt::format("{} pairs of frames show the floor and lie within the sensor's record; {} are the least",
+                            h.pairs, params.least_pairs);
     return h;
   }
   const auto n = static_cast<Eigen::Index>(s.seen.size());
@@ -198,7 +212,8 @@ HeadingScale fit_heading_scale(const std::vector<SeenYaw>& seen, const TurnSourc
     line = line_through(x, y, weights);
   }
   const VectorXd residual = y - line.scale * x - VectorXd::Constant(n, line.bias);
-  h.scale = line.scale, h.low = line.low, h.high = line.high, h.bias_radps = line.bias, h.correlation = line.correlation;
+  h.scale = line.scale, h.low = line.low, h.high = line.high, h.bias_radps = line.bias,
+  h.correlation = line.correlation;
   h.sigma = std::max(jackknife(x, y, weights), 0.5 * (line.high - line.low));
   h.residual_radps = std::sqrt(weights.dot(residual.cwiseProduct(residual)) / std::max(weights.sum(), 1.0));
   h.rms_radps = std::sqrt((y.array() - y.mean()).square().mean());

@@ -16,7 +16,7 @@ namespace wasp::calibration {
 struct SeenYaw {
   TimeNs first_ns = 0, second_ns = 0;
   bool valid = false;
-  double yaw_radps = 0;                                ///< clockwise from above, with scale 1
+  double yaw_radps = 0;                                 ///< clockwise from above, with scale 1
   Eigen::Vector3d down_cam = Eigen::Vector3d::UnitZ();  ///< the world's down at the second frame, as far as is known
 };
 
@@ -26,8 +26,8 @@ std::vector<SeenYaw> seen_yaw(const drivers::Recording& recording, const std::ve
 
 struct HeadingScaleParams {
   int least_pairs = 60;
-  double least_rms_radps = 0.1;      ///< of the true yaw rate about its mean
-  double least_each_way = 0.1;       ///< share of the pairs that turn each way faster than a third of the rms
+  double least_rms_radps = 0.1;  ///< of the true yaw rate about its mean
+  double least_each_way = 0.1;   ///< share of the pairs that turn each way faster than a third of the rms
   double least_correlation = 0.98;
   double most_sigma = 0.01;
   double least_valid = 0.5;

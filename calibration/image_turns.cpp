@@ -136,8 +136,7 @@ Pairs directions_of(const Lens& lens, const vision::FlowField& flow) {
 
 /// Shift in focal lengths and growth of the image at the principal point.
 Vector3d centre_motion(const Intrinsics& k, const vision::FlowField& flow) {
-  const vision::SimilarityFit fit =
-      vision::fit_similarity({.centre_x_px = k.cx_px, .centre_y_px = k.cy_px}, flow);
+  const vision::SimilarityFit fit = vision::fit_similarity({.centre_x_px = k.cx_px, .centre_y_px = k.cy_px}, flow);
   if (!fit.valid) return Vector3d::Constant(std::nan(""));
   return {static_cast<double>(fit.shift_u_px / k.fx_px), static_cast<double>(fit.shift_v_px / k.fy_px),
           static_cast<double>(fit.log_scale)};
@@ -161,16 +160,17 @@ Vector3d fit_rotation(const Pairs& pairs) {
   Matrix3d R = Matrix3d::Identity();
   for (int round = 0; round < kRounds; ++round) {
     R = kabsch(pairs, weights);
-    for (std::size_t i = 0; i < pairs.size(); ++i) residuals[i] = (pairs[i].second - R.transpose() * pairs[i].first).norm();
+    for (std::size_t i = 0; i < pairs.size(); ++i)
+      residuals[i] = (pairs[i].second - R.transpose() * pairs[i].first).norm();
     weights = weights_of(residuals);
   }
   return turn_of(R);
 }
 
 Vector3d fit_epipolar(const Pairs& pairs, const Vector3d& start_rad) {
-  static const std::array<Vector3d, 9> kTravels = {Vector3d(1, 0, 0),  Vector3d(0, 1, 0),   Vector3d(0, 0, 1),
-                                                   Vector3d(1, 1, 0),  Vector3d(1, -1, 0),  Vector3d(1, 0, 1),
-                                                   Vector3d(1, 0, -1), Vector3d(0, 1, 1),   Vector3d(0, 1, -1)};
+  static const std::array<Vector3d, 9> kTravels = {Vector3d(1, 0, 0),  Vector3d(0, 1, 0),  Vector3d(0, 0, 1),
+                                                   Vector3d(1, 1, 0),  Vector3d(1, -1, 0), Vector3d(1, 0, 1),
+                                                   Vector3d(1, 0, -1), Vector3d(0, 1, 1),  Vector3d(0, 1, -1)};
   Motion best{start_rad, Vector3d::UnitZ()};
   double least = 1e300;
   for (const Vector3d& travel : kTravels) {
@@ -214,7 +214,9 @@ std::vector<ImageTurn> image_turns(const drivers::Recording& recording, const st
   vision::FlowField flow;
   std::array<std::vector<std::uint8_t>, 2> pixels{std::vector<std::uint8_t>(size.pixels()),
                                                   std::vector<std::uint8_t>(size.pixels())};
-  const auto view = [&](std::size_t i) { return GrayView{pixels[i].data(), size.width_px, size.height_px, size.width_px}; };
+  const auto view = [&](std::size_t i) {
+    return GrayView{pixels[i].data(), size.width_px, size.height_px, size.width_px};
+  };
   std::vector<ImageTurn> turns;
   std::optional<TimeNs> last_ns;
   std::size_t now = 0;

@@ -19,8 +19,8 @@ struct ImageTurn {
   bool valid = false;
   Eigen::Vector3d rotation_rad = Eigen::Vector3d::Zero();  ///< the camera's own turn, its axes (right, down, forward)
   Eigen::Vector3d epipolar_rad = Eigen::Vector3d::Zero();
-  /// How the image as a whole moved at its centre, for a camera over a level floor: shift right and down in units of the
-  /// focal length, and the natural logarithm of its growth. NaN without a similarity that most of the flow follows.
+  /// How the image as a whole moved at its centre, for a camera over a level floor: shift right and down in units of
+  /// the focal length, and the natural logarithm of its growth. NaN without a similarity that most of the flow follows.
   Eigen::Vector3d centre = Eigen::Vector3d::Constant(std::nan(""));
   int cells = 0;
 };

@@ -41,7 +41,8 @@ Slopes slopes_at(const std::vector<drivers::PoseSample>& poses, std::size_t i) {
   return {(count * tr - t * r) / spread, (count * tx - t * x) / spread};
 }
 
-/// A point X of the floor on the optical axis, distance Z: (x/z)' = -v_x / Z - w_y, (y/z)' = -v_y / Z + w_x; growth v_z / Z.
+/// A point X of the floor on the optical axis, distance Z: (x/z)' = -v_x / Z - w_y, (y/z)' = -v_y / Z + w_x; growth v_z
+/// / Z.
 Vector3d floor_rates(const drivers::PoseStream& poses, const drivers::PoseSample& pose, const Vector3d& rate_cam,
                      const Vector3d& velocity_world) {
   const Eigen::Matrix3d R_world_cam = pose.q_world_sensor.toRotationMatrix() * *poses.R_sensor_cam;
@@ -115,7 +116,8 @@ std::optional<MotionRates> TurnSource::mean_rate(TimeNs from_ns, TimeNs until_ns
   const auto from = integral(from_ns), until = integral(until_ns);
   if (!from || !until || until_ns <= from_ns) return std::nullopt;
   const auto piece = [&](TimeNs t) {
-    return piece_[static_cast<std::size_t>(std::lower_bound(times_ns_.begin(), times_ns_.end(), t) - times_ns_.begin())];
+    return piece_[static_cast<std::size_t>(std::lower_bound(times_ns_.begin(), times_ns_.end(), t) -
+                                           times_ns_.begin())];
   };
   const auto first_after = std::upper_bound(times_ns_.begin(), times_ns_.end(), from_ns) - times_ns_.begin();
   const auto before = first_after > 0 ? piece_[static_cast<std::size_t>(first_after - 1)] : 0;

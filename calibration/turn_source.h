@@ -12,15 +12,16 @@
 namespace wasp::calibration {
 
 /// 0 ... 2: turn rates [rad/s], in camera axes (right, down, forward) where the recording knows how the sensor lies to
-/// the camera, else in the sensor's. 3 ... 5: shift of a level floor at the centre of the image, right and down, in focal
-/// lengths a second, and its growth [1/s].
+/// the camera, else in the sensor's. 3 ... 5: shift of a level floor at the centre of the image, right and down, in
+/// focal lengths a second, and its growth [1/s].
 using MotionRates = Eigen::Matrix<double, 6, 1>;
 
 class TurnSource {
  public:
   static TurnSource from_gyro(const drivers::InertialStream& inertial);
   /// Rates at each pose are the slope of a straight line through the turns within 30 ms, or to its two neighbours:
-  /// motion capture is too noisy to differentiate over less. The filter is even about the instant and so delays nothing.
+  /// motion capture is too noisy to differentiate over less. The filter is even about the instant and so delays
+  /// nothing.
   static TurnSource from_poses(const drivers::PoseStream& poses);
   /// The gyro where there is one, else the poses; nullopt: neither.
   static std::optional<TurnSource> best_of(const drivers::RecordingMotion& motion);

@@ -33,6 +33,7 @@ struct CameraSettings {
   std::string trigger = "off";  ///< off | external
   int buffers = 4;              ///< exposures the device may hold before one is lost
   double readout_us = -1;       ///< from the end of the exposure to the device's time stamp; -1: the driver's estimate
+  double delay_ms = 0;          ///< what `wasp calibrate delay` found: taken off every stamp before it is published
   std::string depth_mode = "raw";                 ///< kinect: raw | registered | mm
   std::string depth_model = "tangent";            ///< kinect, raw: two-gaussians | tangent | linear
   std::vector<double> depth_coefficients;         ///< of that model (drivers/kinect_depth.h); empty: the published ones

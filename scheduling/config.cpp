@@ -76,6 +76,7 @@ void read_camera_settings(TomlTable& t, drivers::CameraSettings& s) {
   t.text_value("trigger", s.trigger, {"off", "external"});
   t.number("buffers", s.buffers, 2, 32);
   t.number("readout_us", s.readout_us, -1, 1e6);
+  t.number("delay_ms", s.delay_ms, -500, 500);
   t.text_value("depth_mode", s.depth_mode, {"raw", "registered", "mm"});
   t.text_value("depth_model", s.depth_model, {"two-gaussians", "tangent", "linear"});
   t.numbers("depth_coefficients", s.depth_coefficients, -1e300, 1e300);

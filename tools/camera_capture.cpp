@@ -30,6 +30,7 @@ void check_promise(const drivers::CameraFormat& format, const drivers::CameraReq
 CameraCapture::CameraCapture(std::string name, const drivers::CameraDriverRow& row,
                              const drivers::CameraRequest& request, CameraRings& rings, scheduling::EventQueue& events)
     : name_(std::move(name)), request_(request), rings_(rings), events_(events), driver_(row.make(request)) {
+  rings_.set_delay(from_seconds(1e-3 * request.settings.delay_ms));
   const std::string_view driver = row.name;
   driver.copy(rings_.status().driver.data(), rings_.status().driver.size() - 1);
 }

@@ -50,7 +50,9 @@ void CameraRings::announce() {
   gray_.announce();
 }
 
-void CameraRings::publish(const drivers::FrameStamp& stamp) {
+void CameraRings::publish(const drivers::FrameStamp& device_stamp) {
+  drivers::FrameStamp stamp = device_stamp;
+  stamp.exposed_at_ns -= delay_ns_;
   slot();
   const bool second_half = depth_alone_ && stamp.sequence == device_sequence_;
   depth_alone_ = !stamp.gray;

@@ -32,6 +32,8 @@ class CameraRings final : public drivers::FrameSink {
   void announce() override;
   void publish(const drivers::FrameStamp& stamp) override;
 
+  /// Taken off every stamp ([camera] delay_ms).
+  void set_delay(DurationNs delay_ns) { delay_ns_ = delay_ns; }
   /// The device was opened: its count begins anew, ours goes on.
   void opened() { first_ = true; }
   /// The device gave a frame, and its number, that was damaged.
@@ -54,6 +56,7 @@ class CameraRings final : public drivers::FrameSink {
   std::uint32_t device_sequence_ = 0, sequence_ = 0;
   std::uint32_t corrupt_since_ = 0;
   TimeNs last_exposed_ns_ = kNever;
+  DurationNs delay_ns_ = 0;
 };
 
 }  // namespace wasp::tools

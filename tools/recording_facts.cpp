@@ -92,19 +92,22 @@ std::string facts_text(const Recording& recording, const RecordingFacts& f) {
   text += line("camera", fmt::format("{}, f {:.1f} {:.1f}, c {:.1f} {:.1f}",
                                      recording.geometry().lens_kind == LensKind::kFisheye ? "fisheye" : "pinhole",
                                      k.fx_px, k.fy_px, k.cx_px, k.cy_px));
-  text += line("length", fmt::format("{:.3f} s from {:.9f}, interval {:.4f} s (nominal {:.2f} Hz)", f.length_s,
-                                     to_seconds(recording.begins_at_ns()), f.median_interval_s,
-                                     recording.nominal_rate_hz()));
+  text += line("length",
+               fmt::format("{:.3f} s from {:.9f}, interval {:.4f} s (nominal {:.2f} Hz)", f.length_s,
+                           to_seconds(recording.begins_at_ns()), f.median_interval_s, recording.nominal_rate_hz()));
   text += line("inertial", inertial_text(recording.motion().inertial));
   text += line("ground truth", poses_text(recording.motion().poses));
-  text += line("attitude", fmt::format("for {} of {} entries of a replay", f.with_attitude, recording.entries().size()));
-  if (!recording.true_flows().empty()) text += line("true flow", fmt::format("{} files", recording.true_flows().size()));
+  text +=
+      line("attitude", fmt::format("for {} of {} entries of a replay", f.with_attitude, recording.entries().size()));
+  if (!recording.true_flows().empty())
+    text += line("true flow", fmt::format("{} files", recording.true_flows().size()));
   for (const auto& note : recording.notes()) text += line("note", note);
   for (const auto& gap : f.gaps)
     text += line("gap", fmt::format("{:.3f} s after entry {} ({:.3f} s)", gap.length_s, gap.after_entry, gap.after_s));
   for (const auto& problem : recording.problems()) text += line("problem", problem);
   for (const auto& problem : f.undecodable) text += line("problem", problem);
-  text += line("counts", fmt::format("{} entries, {} gaps, {} problems", recording.entries().size(), f.gaps.size(), f.problems));
+  text += line("counts",
+               fmt::format("{} entries, {} gaps, {} problems", recording.entries().size(), f.gaps.size(), f.problems));
   for (std::size_t i = 0; i < drivers::kProblemKinds; ++i) {
     const auto kind = static_cast<drivers::ProblemKind>(i);
     if (const auto n = recording.problem_counts().count(kind); n > 0)

@@ -1,6 +1,6 @@
-// wasp-recording DIR: what a folder of recorded data is: layout, frames, rate, gaps, streams beside them, and everything
-// that is wrong with it, by file and line, with a count of each kind.
-// Exit code 0: whole; 1: usable, with problems; 2: no recording; others: usage (CLI11).
+// wasp-recording DIR: what a folder of recorded data is: layout, frames, rate, gaps, streams beside them, and
+// everything that is wrong with it, by file and line, with a count of each kind. Exit code 0: whole; 1: usable, with
+// problems; 2: no recording; others: usage (CLI11).
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -11,7 +11,8 @@
 
 int main(int argc, char** argv) {
   using namespace wasp;
-  CLI::App app{"Says what a folder of recorded data is and what is wrong with it. docs/recordings.md", "wasp-recording"};
+  CLI::App app{"Says what a folder of recorded data is and what is wrong with it. docs/recordings.md",
+               "wasp-recording"};
   std::string folder;
   bool json = false, decode = false;
   app.add_option("DIR", folder, "folder of the recording")->required();

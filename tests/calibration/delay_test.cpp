@@ -24,7 +24,8 @@ TEST(Delay, FoundOnSimulatedRecordings) {
     test::SimulatedRun run("delay");
     run.write_euroc(test::by_hand(seed, 1), options);
     const DelayFit fit = delay_of(run.folder());
-    std::printf("[ measured ] delay %.2f ms: found %.2f, sigma %.2f\n", 1e3 * options.delay_s, 1e3 * fit.delay_s, 1e3 * fit.sigma_s);
+    std::printf("[ measured ] delay %.2f ms: found %.2f, sigma %.2f\n", 1e3 * options.delay_s, 1e3 * fit.delay_s,
+                1e3 * fit.sigma_s);
     EXPECT_TRUE(fit.ok()) << fit.refusal;
     EXPECT_NEAR(fit.delay_s, options.delay_s, 0.003);
     EXPECT_LT(std::abs(fit.delay_s - options.delay_s), std::max(4 * fit.sigma_s, 0.0005));
@@ -68,12 +69,15 @@ TEST(Delay, RefusedWithAnotherRecordingsGyro) {
 /// The lag was found by the data's maker over 1593 frames of which these clips are excerpts of 40.
 class HoverDelay : public testing::TestWithParam<const char*> {};
 TEST_P(HoverDelay, FortyMillisecondsOrARefusal) {
-  const std::filesystem::path folder = std::filesystem::path(WASP_SOURCE_DIR "/../shared/data/hover_mocap") / GetParam();
+  const std::filesystem::path folder =
+      std::filesystem::path(WASP_SOURCE_DIR "/../shared/data/hover_mocap") / GetParam();
   if (!std::filesystem::exists(folder)) GTEST_SKIP() << "no recording at " << folder;
   const DelayFit fit = delay_of(folder);
-  std::printf("[ measured ] %s: %.1f ms, sigma %.1f, likelihood %.0f %s\n", GetParam(), 1e3 * fit.delay_s, 1e3 * fit.sigma_s,
-              fit.likelihood, fit.refusal.c_str());
-  if (fit.ok()) EXPECT_NEAR(fit.delay_s, 0.040, 0.005);
+  std::printf("[ measured ] %s: %.1f ms, sigma %.1f, likelihood %.0f %s\n", GetParam(), 1e3 * fit.delay_s,
+              1e3 * fit.sigma_s, fit.likelihood, fit.refusal.c_str());
+  if (fit.ok()) {
+    EXPECT_NEAR(fit.delay_s, 0.040, 0.005);
+  }
   EXPECT_NEAR(fit.delay_s, 0.040, 3 * fit.sigma_s + 0.005);  // and what is refused is not wrong by more than it says
 }
 INSTANTIATE_TEST_SUITE_P(Clips, HoverDelay, testing::Values("climb", "climb_yaw", "lateral_yaw", "descend"));

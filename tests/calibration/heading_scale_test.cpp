@@ -11,24 +11,24 @@ namespace {
 
 HeadingScale scale_of(const std::filesystem::path& folder, double delay_s, const HeadingScaleParams& params = {}) {
   const auto recording = drivers::Recording::open(folder);
-  return fit_heading_scale(seen_yaw(recording, frame_stamps(recording)), turn_source_of(recording, "best"), delay_s, params);
+  return fit_heading_scale(seen_yaw(recording, frame_stamps(recording)), turn_source_of(recording, "best"), delay_s,
+                           params);
 }
 
 test::RunOptions options(double scale) {
-  return {.seconds = 16, .rate_hz = 15, .delay_s = 0.02, .gyro_scale = scale, .pitch_down = Radians{std::numbers::pi / 2}};
+  return {
+      .seconds = 16, .rate_hz = 15, .delay_s = 0.02, .gyro_scale = scale, .pitch_down = Radians{std::numbers::pi / 2}};
 }
 
-sim::StandParams stand() {
-  return {.turntable = true, .profile = sim::StandProfile::kSteps, .start_s = 1};
-}
+sim::StandParams stand() { return {.turntable = true, .profile = sim::StandProfile::kSteps, .start_s = 1}; }
 
 TEST(HeadingScale, IsFoundOnTheTurntable) {
   for (const double truth : {1.0, 1.07, 0.93}) {
     test::SimulatedRun run("turntable");
     run.write_wasp(test::on_turntable(stand()), options(truth));
     const HeadingScale h = scale_of(run.folder(), 0.02);
-    std::printf("[ measured ] scale %.3f: found %.4f, sigma %.4f, correlation %.5f, bias %.4f\n", truth, h.scale, h.sigma,
-                h.correlation, h.bias_radps);
+    std::printf("[ measured ] scale %.3f: found %.4f, sigma %.4f, correlation %.5f, bias %.4f\n", truth, h.scale,
+                h.sigma, h.correlation, h.bias_radps);
     EXPECT_TRUE(h.ok()) << h.refusal;
     EXPECT_NEAR(h.scale, truth, 0.015);
     EXPECT_NEAR(h.bias_radps, -0.05, 0.01);
@@ -78,7 +78,8 @@ TEST(HeadingScale, RefusedWhenStillOrOneWayOrLookingAhead) {
 TEST(HeadingScale, HoverClipsAreTooShortAndSaySo) {
   const std::filesystem::path folder = WASP_SOURCE_DIR "/../shared/data/hover_mocap/climb_yaw";
   if (!std::filesystem::exists(folder)) GTEST_SKIP() << "no recording at " << folder;
-  HeadingScaleParams bare{.least_pairs = 20, .least_rms_radps = 0, .least_each_way = 0, .least_correlation = 0, .most_sigma = 1};
+  HeadingScaleParams bare{
+      .least_pairs = 20, .least_rms_radps = 0, .least_each_way = 0, .least_correlation = 0, .most_sigma = 1};
   const HeadingScale h = scale_of(folder, 0.04, bare);
   std::printf("[ measured ] climb_yaw: scale %.3f, sigma %.3f, correlation %.3f\n", h.scale, h.sigma, h.correlation);
   EXPECT_FALSE(scale_of(folder, 0.04).ok());

@@ -33,7 +33,8 @@ inline Path by_hand(unsigned seed, double turn) {
   };
   std::array<std::array<Sine, 3>, 6> sines;
   for (auto& axis : sines)
-    for (Sine& s : axis) s = {0.4 + 0.6 * uniform(random), 2 * std::numbers::pi * (0.25 + 1.2 * uniform(random)), 6.28 * uniform(random)};
+    for (Sine& s : axis)
+      s = {0.4 + 0.6 * uniform(random), 2 * std::numbers::pi * (0.25 + 1.2 * uniform(random)), 6.28 * uniform(random)};
   return [=](double t) {
     std::array<float, 6> x{};
     for (std::size_t a = 0; a < 6; ++a)
@@ -50,7 +51,8 @@ inline Path by_hand(unsigned seed, double turn) {
 /// Level, turning about the vertical as the platform of figure 5.6 does.
 inline Path on_turntable(const sim::StandParams& stand) {
   std::vector<double> yaws{0};
-  for (int ms = 0; ms < 60'000; ++ms) yaws.push_back(yaws.back() + 0.001 * sim::stand_yaw_rate_radps(stand, 0.001 * ms));
+  for (int ms = 0; ms < 60'000; ++ms)
+    yaws.push_back(yaws.back() + 0.001 * sim::stand_yaw_rate_radps(stand, 0.001 * ms));
   return [yaws](double t) {
     const double at = std::max(t, 0.0) * 1000;
     const auto before = static_cast<std::size_t>(at);
@@ -101,7 +103,8 @@ class SimulatedRun {
     yaml << "T_BS:\n  data: [";
     for (int i = 0; i < 3; ++i) yaml << R(i, 0) << ", " << R(i, 1) << ", " << R(i, 2) << ", 0,\n";
     yaml << "0, 0, 0, 1]\nrate_hz: " << o.rate_hz << "\nresolution: [160, 120]\ncamera_model: pinhole\n"
-         << "intrinsics: [130, 130, 79.5, 59.5]\ndistortion_model: radial-tangential\ndistortion_coefficients: [0, 0, 0, 0]\n";
+         << "intrinsics: [130, 130, 79.5, 59.5]\ndistortion_model: radial-tangential\ndistortion_coefficients: [0, 0, "
+            "0, 0]\n";
     write_images(path, o, [&](int, TimeNs stamp) {
       const std::string file = std::to_string(kEpoch + stamp) + ".png";
       index << kEpoch + stamp << "," << file << "\n";
@@ -116,13 +119,14 @@ class SimulatedRun {
   void write_wasp(const Path& path, const RunOptions& o) {
     std::filesystem::create_directories(folder_ / "rgb");
     std::ofstream index(folder_ / "rgb.txt"), imu(folder_ / "imu.csv"), toml(folder_ / "camera.toml");
-    toml << "width_px = 160\nheight_px = 120\nfx_px = 130.0\nfy_px = 130.0\ncx_px = 79.5\ncy_px = 59.5\npitch_down_deg = "
+    toml << "width_px = 160\nheight_px = 120\nfx_px = 130.0\nfy_px = 130.0\ncx_px = 79.5\ncy_px = 59.5\npitch_down_deg "
+            "= "
          << o.pitch_down.value * 180 / std::numbers::pi << "\nrate_hz = " << o.rate_hz << "\n";
     imu << "exposed_at_ns,sequence,fields,ax,ay,az,gx,gy,gz\n";
     write_images(path, o, [&](int n, TimeNs stamp) {
       const std::string file = "rgb/frame-" + std::to_string(n) + ".png";
-      index << (kEpoch + stamp) / kSecond << "." << std::to_string(kSecond + (kEpoch + stamp) % kSecond).substr(1) << " "
-            << file << "\n";
+      index << (kEpoch + stamp) / kSecond << "." << std::to_string(kSecond + (kEpoch + stamp) % kSecond).substr(1)
+            << " " << file << "\n";
       return folder_ / file;
     });
     int n = 0;
@@ -137,7 +141,8 @@ class SimulatedRun {
   template <class Place>
   void write_images(const Path& path, const RunOptions& o, const Place& place) {
     sim::SimConfig config;
-    config.camera.intrinsics = {.width_px = kWidth, .height_px = kHeight, .fx_px = 130.f, .fy_px = 130.f, .cx_px = 79.5f, .cy_px = 59.5f};
+    config.camera.intrinsics = {
+        .width_px = kWidth, .height_px = kHeight, .fx_px = 130.f, .fy_px = 130.f, .cx_px = 79.5f, .cy_px = 59.5f};
     config.camera.R_body_cam = R_body_cam_from_pitch_down(o.pitch_down);
     config.camera.position_body_m = Vec3::Zero();
     static const auto kScene = sim::make_world_scene(sim::SimConfig{});
@@ -157,7 +162,8 @@ class SimulatedRun {
     std::normal_distribution<float> noise(0.f, static_cast<float>(o.gyro_noise_radps));
     for (double t = 0.5; t < o.seconds + 1.5; t += 0.005) {
       // The mean of 5 ms stands for their middle.
-      const Vec3 w = static_cast<float>(o.gyro_scale) * gyro(path, t) + Vec3(noise(random) + 0.02f, noise(random), noise(random) - 0.05f);
+      const Vec3 w = static_cast<float>(o.gyro_scale) * gyro(path, t) +
+                     Vec3(noise(random) + 0.02f, noise(random), noise(random) - 0.05f);
       write(from_seconds(t - 0.0025), w);
     }
   }

@@ -101,5 +101,14 @@ TEST(CameraRings, BothImagesOfAnExposureBearOneNumberHoweverTheyCome) {
   EXPECT_EQ(r.rings.status().dropped, 0u);
 }
 
+TEST(CameraRings, AKnownDelayIsTakenOffTheStampsOfBothImages) {
+  Rings r;
+  r.rings.set_delay(40 * kMillisecond);
+  r.rings.opened();
+  r.rings.publish({.exposed_at_ns = kSecond, .sequence = 1});
+  EXPECT_EQ(Rings::header(r.gray.look(1)).exposed_at_ns, 960 * kMillisecond);
+  EXPECT_EQ(Rings::header(r.depth.look(1)).exposed_at_ns, 960 * kMillisecond);
+}
+
 }  // namespace
 }  // namespace wasp

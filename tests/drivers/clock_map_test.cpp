@@ -118,9 +118,9 @@ TEST(ClockMap, StartsAnewAfterAReboot) {
 }
 
 /// A day in the life of a bad line: 40 ppm of drift that wanders, 0.5 ms of queueing each way, one exchange in twenty
-/// held up for up to 80 ms (a host that stalls), one in fifty answered with a wrong time, the way back 0.6 ms longer than
-/// the way there, and a reboot in the middle. Error percentiles of mapping an instant between exchanges, ten seconds
-/// after the start and after the reboot. What no exchange can tell is half the difference of the two ways.
+/// held up for up to 80 ms (a host that stalls), one in fifty answered with a wrong time, the way back 0.6 ms longer
+/// than the way there, and a reboot in the middle. Error percentiles of mapping an instant between exchanges, ten
+/// seconds after the start and after the reboot. What no exchange can tell is half the difference of the two ways.
 TEST(ClockMap, ErrorPercentilesOnABadLine) {
   for (const unsigned seed : {1u, 2u, 3u, 4u}) {
     SimulatedLine line;
@@ -147,12 +147,14 @@ TEST(ClockMap, ErrorPercentilesOnABadLine) {
         errors_us.push_back(std::abs(static_cast<double>(map.to_local(theirs(instant)) - instant)) * 1e-3);
     }
     std::sort(errors_us.begin(), errors_us.end());
-    const auto at = [&](double share) { return errors_us[static_cast<std::size_t>(share * static_cast<double>(errors_us.size() - 1))]; };
-    std::printf("[ measured ] seed %u: error p50 %.0f p95 %.0f p99 %.0f p99.9 %.0f max %.0f us, %d restart\n", seed, at(0.5),
-                at(0.95), at(0.99), at(0.999), at(1), restarts);
+    const auto at = [&](double share) {
+      return errors_us[static_cast<std::size_t>(share * static_cast<double>(errors_us.size() - 1))];
+    };
+    std::printf("[ measured ] seed %u: error p50 %.0f p95 %.0f p99 %.0f p99.9 %.0f max %.0f us, %d restart\n", seed,
+                at(0.5), at(0.95), at(0.99), at(0.999), at(1), restarts);
     EXPECT_EQ(restarts, 1);
     EXPECT_GT(errors_us.size(), 11'000u);
-    EXPECT_LT(at(0.5), 500);   // 300 us of them are the two ways' difference
+    EXPECT_LT(at(0.5), 500);  // 300 us of them are the two ways' difference
     EXPECT_LT(at(0.99), 1000);
     EXPECT_LT(at(1), 2000);
   }

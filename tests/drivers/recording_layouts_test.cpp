@@ -56,7 +56,8 @@ TEST(RisingTimes, OneWrongTimeCostsOneEntry) {
 }
 
 TEST_F(Layouts, TumJoinsTheNearestAndKeepsWhatHasNoPartner) {
-  std::string rgb = "# color images\r\n# file: 'rgbd_dataset_freiburg2_desk.bag'\r\n# timestamp filename\r\n", dep = rgb;
+  std::string rgb = "# color images\r\n# file: 'rgbd_dataset_freiburg2_desk.bag'\r\n# timestamp filename\r\n",
+              dep = rgb;
   for (int i = 0; i < 6; ++i) {
     gray("rgb/" + std::to_string(i) + ".png");
     rgb += "1305031102." + std::to_string(100000 + 33000 * i) + " rgb/" + std::to_string(i) + ".png\r\n";
@@ -153,8 +154,10 @@ TEST_F(Layouts, SevenScenesHasColourPosesAndGaps) {
 }
 
 constexpr const char* kCameraYaml =
-    "%YAML:1.0\nsensor_type: camera\nT_BS:\n  cols: 4\n  rows: 4\n  data: [0.0, -1.0, 0.0, 0.1,\n         1.0, 0.0, 0.0, 0.2,\n"
-    "         0.0, 0.0, 1.0, 0.3,\n         0.0, 0.0, 0.0, 1.0]\nrate_hz: 20\nresolution: [32, 24]\ncamera_model: pinhole\n"
+    "%YAML:1.0\nsensor_type: camera\nT_BS:\n  cols: 4\n  rows: 4\n  data: [0.0, -1.0, 0.0, 0.1,\n         1.0, 0.0, "
+    "0.0, 0.2,\n"
+    "         0.0, 0.0, 1.0, 0.3,\n         0.0, 0.0, 0.0, 1.0]\nrate_hz: 20\nresolution: [32, 24]\ncamera_model: "
+    "pinhole\n"
     "intrinsics: [30.5, 31.5, 15.5, 11.5] #fu, fv, cu, cv\ndistortion_model: radial-tangential\n"
     "distortion_coefficients: [-0.28, 0.07, 0.0002, 1.8e-05]\n";
 

@@ -78,7 +78,8 @@ const std::vector<std::vector<std::uint8_t>>& images() {
 
 void check(const drivers::Recording& recording) {
   fuzz::require(!recording.entries().empty(), "an open recording has entries");
-  fuzz::require(recording.problems().empty() == (recording.problem_counts().total() == 0), "problems are told and counted");
+  fuzz::require(recording.problems().empty() == (recording.problem_counts().total() == 0),
+                "problems are told and counted");
   TimeNs before_ns = -1;
   for (const auto& sample : recording.motion().inertial.samples) {
     fuzz::require(sample.time_ns > before_ns, "inertial samples are in order of time");
