@@ -15,7 +15,8 @@ constexpr double kBack_ms = 1000;    // a stream that is back is used again
 constexpr double kVehicle_ms = 260;  // age limit of the attitude, one control period, one deadline
 constexpr double kSilence_ms = 300;
 constexpr double kGuardian_ms = 100, kHang_ms = 75, kRestart_ms = 500;
-constexpr double kReport_ms = 500;
+constexpr double kReport_ms = 500, kBoard_ms = 2100;
+constexpr double kLanded_ms = 40'000;  // from any phase, slowly
 constexpr unsigned kBoth = kHover | kCruise;
 
 /// A row: what is done, and behind it what is promised. Promises not given: within limits, in every phase.
@@ -32,6 +33,7 @@ class Row {
   constexpr Row tainting(double after_ms) const { return with(&Fault::tainted_after_ms, after_ms); }
   constexpr Row alone() const { return with(&Fault::isolated, true); }
   constexpr Row noisy() const { return with(&Fault::noisy, true); }
+  constexpr Row own_machine() const { return with(&Fault::own_machine, true); }
   constexpr Row brief() const { return with(&Fault::in_short, true); }  ///< part of the short set
 
   constexpr Row neutral(double within_ms, double back_ms = kBack_ms) const {
@@ -45,8 +47,9 @@ class Row {
   constexpr Row said(std::string_view text, double within_ms) const {
     return promised(kBounded, within_ms, 0, 0).saying(text);
   }
+  constexpr Row restarts() const { return promised(kRestarts, 0, 0, kBoard_ms); }
   constexpr Row unaffected() const { return promised(kUnaffected, 0, 0, 0); }
-  constexpr Row ends() const { return promised(kEnds, 0, 0, 0); }
+  constexpr Row ends() const { return promised(kEnds, kReport_ms, 0, kLanded_ms); }
   constexpr Row refused(std::string_view says) const { return promised(kRefused, 0, 0, 0).saying(says); }
 
  private:
@@ -194,11 +197,18 @@ constexpr Fault kRows[] = {
     Row(10, "flight-abort-signal", kSignal, "abort").to("flight").guarded(),
     Row(10, "flight-aborts", kPoint, "process.abort").guarded(),
     Row(10, "flight-wild-read", kPoint, "process.segv").guarded(),
-    Row(10, "guardian-killed", kSignal, "kill").to("guardian").ends().alone(),
+    Row(10, "guardian-killed", kSignal, "kill").to("guardian").ends().saying("landing in order").alone(),
+    Row(10, "guardian-stopped", kSignal, "stop").to("guardian").unaffected(),
 
     // 11: observers.
     Row(11, "recorder-killed", kSignal, "kill").to("recorder").unaffected().brief(),
     Row(11, "recorder-stopped", kSignal, "stop").to("recorder").lasting(2).unaffected().in(kCruise),
+    Row(11, "monitor-killed", kSignal, "kill").to("monitor").unaffected().in(kBoth),
+    Row(11, "monitor-stopped", kSignal, "stop").to("monitor").lasting(2).unaffected().in(kBoth),
+    Row(11, "gateway-killed", kSignal, "kill").to("gateway").unaffected().in(kBoth),
+    Row(11, "gateway-stopped", kSignal, "stop").to("gateway").lasting(2).unaffected().in(kBoth),
+    Row(11, "gateway-daemon-stopped", kSignal, "stop").to("daemon").lasting(2).unaffected().in(kBoth),
+    Row(11, "gateway-daemon-killed", kSignal, "kill").to("daemon").unaffected().in(kBoth),
 
     // 12: load.
     Row(12, "hog-fifo-99", kHog, "", 99).lasting(0.13).noisy(),
@@ -216,12 +226,16 @@ constexpr Fault kRows[] = {
     Row(13, "core-stolen", kSteal, "core", 0).to("control").lasting(2).said(" is now ", 1000),
     Row(13, "link-policy-stolen", kSteal, "policy").to("link").lasting(2).said(" is now ", 1000),
     Row(13, "memlock-limit", kLimit, "memlock", 8 << 20).to("flight").unaffected(),
+    Row(13, "core-offlined", kCore).lasting(2).said(" is now ", 1000).own_machine(),
     Row(13, "start-memlock", kStart, "memlock 8 MiB").refused("memlock|lock"),
     Row(13, "start-no-priority", kStart, "no priority").refused("SCHED_FIFO|rtprio|priority"),
+    Row(13, "start-budget", kStart, "budget").refused("sched_rt_runtime_us"),
+    Row(13, "start-budget-of-the-kernel", kStart, "budget of the kernel").refused("sched_rt_runtime_us").own_machine(),
 
     // 14: wall time.
-    Row(14, "wall-clock-year-ahead", kClock, "", 365.25 * 86400).unaffected(),
-    Row(14, "wall-clock-year-back", kClock, "", -365.25 * 86400).unaffected(),
+    Row(14, "wall-clock-year-ahead", kClock, "", 365.25 * 86400).unaffected().own_machine(),
+    Row(14, "wall-clock-year-back", kClock, "", -365.25 * 86400).unaffected().own_machine(),
+    Row(14, "start-time-namespace", kStart, "time namespace").refused("another time namespace.*3600 s"),
 
     // 15: disks, descriptors, memory files.
     Row(15, "recorder-file-limit", kLimit, "fsize", 4096).to("recorder").lasting(2).unaffected(),
@@ -230,7 +244,9 @@ constexpr Fault kRows[] = {
     Row(15, "flight-file-limit", kLimit, "fsize", 0).to("flight").unaffected(),
     Row(15, "start-shm-full", kStart, "shm full").refused("/dev/shm"),
     Row(15, "start-no-descriptors", kStart, "no descriptors").refused("Too many open files"),
-    Row(15, "recorder-disk-full", kDisk, "full").lasting(3).unaffected(),
+    Row(15, "recorder-disk-full", kDisk, "full").to("recorder").lasting(3).unaffected(),
+    Row(15, "recorder-disk-errors", kDisk, "errors").to("recorder").lasting(2).unaffected(),
+    Row(15, "recorder-disk-slow", kDisk, "slow", 400).to("recorder").lasting(3).unaffected(),
 
     // 16: shared memory.
     Row(16, "camera-bits-flip", kRegion, "flip_pixels", 2000).to("camera"),
@@ -245,6 +261,7 @@ constexpr Fault kRows[] = {
     Row(16, "camera-second-writer", kRegion, "second_writer").to("camera").unaffected(),
     Row(16, "flight-bits-flip", kRegion, "flip_pixels", 200).to("flight").in(kBoth).alone(),
     Row(16, "flight-second-writer", kRegion, "second_writer").to("flight").unaffected().brief(),
+    Row(16, "start-stale-layout", kStart, "stale layout").refused("layout version"),
     Row(16, "start-second-flight", kStart, "second flight").refused("writer|written|lock|another"),
 
     // 17: hostile input.
@@ -266,6 +283,11 @@ constexpr Fault kRows[] = {
     Row(17, "sim-config-broken", kStart, "broken sim config").refused("mass_kg"),
     Row(17, "timeline-unknown-point", kStart, "broken timeline").refused("bad:[0-9].*no fault point"),
     Row(17, "timeline-unknown-key", kStart, "timeline key").refused("bad:[0-9].*whom"),
+
+    // 18: the board.
+    Row(18, "board-unwatched", kBoard).restarts().in(kHover),
+    Row(18, "start-watchdog-absent", kStart, "no watchdog").refused("hardware watchdog /dev/absent"),
+    Row(18, "start-watchdog-is-none", kStart, "not a watchdog").refused("hardware watchdog /dev/null"),
 };
 
 }  // namespace

@@ -72,8 +72,16 @@ Guardian::Guardian(GuardPlan plan, std::vector<std::string> command, bool real_t
 
 Guardian::~Guardian() {
   flight_.reset();
-  for (const int fd : {signals_fd_, sockets_.giver, sockets_.taker})
-    if (fd >= 0) close(fd);
+  successor_.reset();
+  if (signals_fd_ >= 0) close(signals_fd_);
+}
+
+std::unique_ptr<FlightChild> Guardian::child() {
+  return std::make_unique<FlightChild>(command_, page_.fd(), port_.fd(), cores_);
+}
+
+bool Guardian::may_restart() const {
+  return static_cast<int>(page_.block().incarnation.load()) < plan_.guard.restarts;
 }
 
 void Guardian::start() {
@@ -81,13 +89,10 @@ void Guardian::start() {
   block.next_due_ns.store(0);
   block.commanding.store(0);
   block.beat_at_ns.store(0);
-  for (const int fd : {sockets_.giver, sockets_.taker})
-    if (fd >= 0) close(fd);
-  sockets_ = drivers::make_handover();
   killed_ = reported_end_ = false;
-  flight_.reset();
-  flight_ =
-      std::make_unique<FlightChild>(command_, FlightChild::Descriptors{page_.fd(), port_.fd(), sockets_.taker}, cores_);
+  if (successor_ && successor_->poll()) successor_.reset();
+  flight_ = successor_ ? std::move(successor_) : child();
+  flight_->go();
 }
 
 int Guardian::run() {
@@ -138,7 +143,8 @@ void Guardian::tend_line() {
   if (!line_gone_) return;
   if (!port_.try_reopen()) return;
   line_gone_ = false;
-  drivers::give_descriptor(sockets_.giver, port_.fd());
+  flight_->give_line(port_.fd());
+  if (successor_) successor_->give_line(port_.fd());
 }
 
 GuardSight Guardian::sight(TimeNs planned_ns) {
@@ -164,7 +170,9 @@ void Guardian::act(const GuardDeed& deed, TimeNs now_ns) {
   if (state_.ours && (deed.speak || deed.take)) speak(now_ns);
   if (deed.take)
     say(fmt::format("took the line: {} ms since the last beat", (now_ns - state_.beat_at_taking_ns) / kMillisecond));
+  if (deed.take && flight_ && !flight_->poll() && may_restart()) successor_ = child();
   if (deed.give_back) {
+    successor_.reset();
     block.owner.store(static_cast<std::uint32_t>(LineOwner::kFlight));
     say(fmt::format("gave the line back after {} ms and {} neutral setpoints",
                     (now_ns - state_.taken_at_ns) / kMillisecond, spoken_));
@@ -208,7 +216,7 @@ bool Guardian::ended(const ProcessEnd& end) {
                         : fmt::format("flight process ended with code {} while it commanded", end.code));
   reported_end_ = true;
   const bool ran = block.beat_at_ns.load() != 0;
-  if (!crashed || !ran || static_cast<int>(block.incarnation.load()) >= plan_.guard.restarts) return false;
+  if (!crashed || !ran || !may_restart()) return false;
   block.incarnation.fetch_add(1);
   state_.restarted = true;
   start();

@@ -1,5 +1,7 @@
 // Coin parses and hands out triangles with their material, texture coordinates and place; two that make a planar quad
 // of one surface become one again. What moves (sim/vrml_motion.h) is gathered apart and put behind the rest.
+#include "sim/vrml_coin.h"
+
 #include <Inventor/SbMatrix.h>
 #include <Inventor/SoDB.h>
 #include <Inventor/SoInput.h>
@@ -18,23 +20,15 @@
 #include <Inventor/errors/SoDebugError.h>
 #include <Inventor/errors/SoReadError.h>
 #include <Inventor/nodes/SoShape.h>
-#include <signal.h>
-#include <sys/resource.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <bit>
-#include <cerrno>
 #include <cmath>
-#include <cstring>
 #include <map>
-#include <mutex>
 #include <stdexcept>
 
 #include "drivers/image_file.h"
 #include "sim/lab_textures.h"
 #include "sim/vrml_exposure.h"
-#include "sim/vrml_file.h"
 #include "sim/vrml_motion.h"
 #include "sim/vrml_shapes.h"
 #include "sim/vrml_text.h"
@@ -46,7 +40,7 @@ namespace fs = std::filesystem;
 constexpr float kFarthest_m = 1e5f;
 constexpr int kMaxTexturePx = 4096;
 
-std::string read_errors;  // of the parse under way; read_mutex is held
+std::string read_errors;  // of the parse under way
 
 Vec3 ned_of(const SbVec3f& p) { return {-p[2], p[0], -p[1]}; }
 
@@ -353,7 +347,10 @@ VrmlMotions motions_of(SoVRMLGroup& root, const fs::path& file) {
   }
 }
 
-Scene read_here(const fs::path& file) {
+}  // namespace
+
+Scene read_vrml_with_coin(const fs::path& file) {
+  SoDB::init();
   SoReadError::setHandlerCallback(note_error, nullptr);
   SoDebugError::setHandlerCallback([](const SoError*, void*) {}, nullptr);
   SoVRMLImageTexture::setDelayFetchURL(TRUE);  // pictures are read here, not by Coin
@@ -377,41 +374,6 @@ Scene read_here(const fs::path& file) {
   scene.world.sky = sky;
   if (smooth) scene.world.make_smooth();
   return scene;
-}
-
-/// Coin takes hostile files at their word and may crash on one: a child reads it first, and whatever becomes of that is
-/// an error of the file. Throws std::runtime_error naming it.
-void survive_in_a_child(const fs::path& file) {
-  constexpr rlim_t kSeconds = 60;
-  const pid_t child = fork();
-  if (child < 0) throw std::runtime_error(file.string() + ": cannot be tried in a child: " + std::strerror(errno));
-  if (child == 0) {
-    for (const int s : {SIGSEGV, SIGBUS, SIGABRT, SIGFPE, SIGILL}) signal(s, SIG_DFL);
-    const rlimit no_core{0, 0}, patience{kSeconds, kSeconds};
-    setrlimit(RLIMIT_CORE, &no_core);
-    setrlimit(RLIMIT_CPU, &patience);
-    try {
-      read_here(file);
-    } catch (const std::exception&) {  // told by the parent, which reads it again
-    }
-    _exit(0);
-  }
-  int status = 0;
-  while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
-  }
-  if (!WIFEXITED(status) || WEXITSTATUS(status) != 0)
-    throw std::runtime_error(file.string() + ": the VRML library fails on this file" +
-                             (WIFSIGNALED(status) ? std::string(": ") + strsignal(WTERMSIG(status)) : std::string()));
-}
-
-}  // namespace
-
-Scene read_vrml(const fs::path& file) {
-  static std::mutex read_mutex;  // Coin and its error handlers are one for the process
-  const std::lock_guard lock(read_mutex);
-  SoDB::init();
-  survive_in_a_child(file);
-  return read_here(file);
 }
 
 }  // namespace wasp::sim
