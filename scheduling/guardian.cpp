@@ -80,8 +80,15 @@ std::unique_ptr<FlightChild> Guardian::child() {
   return std::make_unique<FlightChild>(command_, page_.fd(), port_.fd(), cores_);
 }
 
-bool Guardian::may_restart() const {
-  return static_cast<int>(page_.block().incarnation.load()) < plan_.guard.restarts;
+bool Guardian::may_restart() const { return static_cast<int>(page_.block().incarnation.load()) < plan_.guard.restarts; }
+
+/// Of a flight that hangs and may have to be killed.
+void Guardian::prepare_successor() {
+  try {
+    successor_ = child();
+  } catch (const std::exception& e) {  // tried again when it is needed
+    say(fmt::format("no successor is prepared: {}", e.what()));
+  }
 }
 
 void Guardian::start() {
@@ -170,7 +177,7 @@ void Guardian::act(const GuardDeed& deed, TimeNs now_ns) {
   if (state_.ours && (deed.speak || deed.take)) speak(now_ns);
   if (deed.take)
     say(fmt::format("took the line: {} ms since the last beat", (now_ns - state_.beat_at_taking_ns) / kMillisecond));
-  if (deed.take && flight_ && !flight_->poll() && may_restart()) successor_ = child();
+  if (deed.take && !flight_->poll() && may_restart()) prepare_successor();
   if (deed.give_back) {
     successor_.reset();
     block.owner.store(static_cast<std::uint32_t>(LineOwner::kFlight));
@@ -219,7 +226,12 @@ bool Guardian::ended(const ProcessEnd& end) {
   if (!crashed || !ran || !may_restart()) return false;
   block.incarnation.fetch_add(1);
   state_.restarted = true;
-  start();
+  try {
+    start();
+  } catch (const std::exception& e) {  // neutral goes on to its end
+    say(fmt::format("flight process cannot be started again: {}", e.what()));
+    return false;
+  }
   say(fmt::format("flight process started again (pid {}); it never commands", flight_->pid()));
   return true;
 }

@@ -29,6 +29,7 @@ class Guardian {
 
  private:
   std::unique_ptr<FlightChild> child();
+  void prepare_successor();
   void start();
   [[nodiscard]] bool may_restart() const;
   void wait(TimeNs until_ns);
