@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <sys/prctl.h>
+#include <sys/resource.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -19,6 +20,8 @@ namespace {
 
 constexpr int kLastInherited = kGoDescriptor;
 
+constexpr int kHurriedNice = -15;
+
 /// Puts page, line, its socket and the word to go where a guarded flight looks for them. Above the targets first: they
 /// may be among them.
 bool inherit(const std::array<int, 4>& from) {
@@ -32,7 +35,8 @@ bool inherit(const std::array<int, 4>& from) {
 
 }  // namespace
 
-FlightChild::FlightChild(const std::vector<std::string>& command, int page, int line, const cpu_set_t& cores)
+FlightChild::FlightChild(const std::vector<std::string>& command, int page, int line, const cpu_set_t& cores,
+                         bool hurried)
     : sockets_(drivers::make_handover()) {
   int go[2];
   if (pipe2(go, O_CLOEXEC) != 0) throw std::runtime_error(std::string("pipe: ") + std::strerror(errno));
@@ -50,6 +54,7 @@ FlightChild::FlightChild(const std::vector<std::string>& command, int page, int 
     sigemptyset(&none);
     sigprocmask(SIG_SETMASK, &none, nullptr);
     sched_setaffinity(0, sizeof cores, &cores);
+    if (hurried) setpriority(PRIO_PROCESS, 0, kHurriedNice);
     if (inherit({page, line, sockets_.taker, go[0]})) execv(argv[0], argv.data());
     _exit(127);
   }
@@ -78,6 +83,11 @@ void FlightChild::give_line(int line) noexcept { drivers::give_descriptor(socket
 
 void FlightChild::signal(int number) const noexcept {
   if (!end_) kill(pid_, number);  // not reaped yet, so the number is still its own
+}
+
+void FlightChild::kill_at_once() const noexcept {
+  if (!end_) setpriority(PRIO_PROCESS, static_cast<id_t>(pid_), kHurriedNice);
+  signal(SIGKILL);
 }
 
 const std::optional<ProcessEnd>& FlightChild::poll() noexcept {

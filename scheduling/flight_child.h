@@ -24,7 +24,8 @@ class FlightChild {
  public:
   /// Starts `command[0]` on the cores of `cores`, without the guardian's priority. Throws std::runtime_error or
   /// std::system_error.
-  FlightChild(const std::vector<std::string>& command, int page, int line, const cpu_set_t& cores);
+  /// `hurried`: ahead of ordinary processes, for an armed vehicle waits for it.
+  FlightChild(const std::vector<std::string>& command, int page, int line, const cpu_set_t& cores, bool hurried);
   ~FlightChild();  ///< kills it, if it still runs
   FlightChild(const FlightChild&) = delete;
   FlightChild& operator=(const FlightChild&) = delete;
@@ -32,6 +33,8 @@ class FlightChild {
   [[nodiscard]] pid_t pid() const noexcept { return pid_; }
   [[nodiscard]] int pid_fd() const noexcept { return pid_fd_; }  ///< readable once it has ended
   void signal(int number) const noexcept;
+  /// SIGKILL, and its end ahead of ordinary processes: its memory takes a while to be taken apart.
+  void kill_at_once() const noexcept;
   /// It may begin.
   void go() noexcept;
   /// The line was opened again.

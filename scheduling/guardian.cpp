@@ -77,7 +77,8 @@ Guardian::~Guardian() {
 }
 
 std::unique_ptr<FlightChild> Guardian::child() {
-  return std::make_unique<FlightChild>(command_, page_.fd(), port_.fd(), cores_);
+  const bool hurried = state_.ours || state_.restarted;
+  return std::make_unique<FlightChild>(command_, page_.fd(), port_.fd(), cores_, hurried);
 }
 
 bool Guardian::may_restart() const { return static_cast<int>(page_.block().incarnation.load()) < plan_.guard.restarts; }
@@ -186,7 +187,7 @@ void Guardian::act(const GuardDeed& deed, TimeNs now_ns) {
   }
   if (deed.kill && !killed_) {
     killed_ = true;
-    flight_->signal(SIGKILL);
+    flight_->kill_at_once();
     say("the control thread does not beat: flight process killed");
   }
 }

@@ -22,7 +22,7 @@ std::vector<std::string> waits() { return {"/bin/sh", "-c", "[ \"$(head -c 1 <&6
 
 TEST(FlightChild, WaitsUntilItIsToldToGo) {
   const GuardPage page = GuardPage::create();
-  FlightChild child(waits(), page.fd(), STDERR_FILENO, anywhere());
+  FlightChild child(waits(), page.fd(), STDERR_FILENO, anywhere(), false);
   usleep(50'000);
   EXPECT_FALSE(child.poll()) << "it waits";
   child.go();
@@ -36,7 +36,7 @@ TEST(FlightChild, FindsPageAndLine) {
   FlightChild child(
       {"/bin/sh", "-c",
        "[ -e /proc/self/fd/4 ] && [ -S /proc/self/fd/5 ] && readlink /proc/self/fd/3 | grep -q wasp-guard"},
-      page.fd(), STDERR_FILENO, anywhere());
+      page.fd(), STDERR_FILENO, anywhere(), false);
   child.go();
   ASSERT_TRUE(test::eventually([&] { return child.poll().has_value(); }));
   EXPECT_EQ(child.poll()->code, 0);
@@ -46,7 +46,7 @@ TEST(FlightChild, DiesWithWhoHoldsIt) {
   const GuardPage page = GuardPage::create();
   pid_t pid = 0;
   {
-    const FlightChild child(waits(), page.fd(), STDERR_FILENO, anywhere());
+    const FlightChild child(waits(), page.fd(), STDERR_FILENO, anywhere(), false);
     pid = child.pid();
     EXPECT_EQ(kill(pid, 0), 0);
   }
