@@ -4,6 +4,7 @@
 #include <signal.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <deque>
 #include <regex>
@@ -99,7 +100,10 @@ class Campaign {
     plan.guarded = options_.guarded;
     plan.replay = options_.replay;
     plan.weakened = options_.weakened;
-    plan.recorder = std::ranges::any_of(g.cells, [](const Cell& c) { return c.fault->target == "recorder"; });
+    for (const Cell& cell : g.cells)
+      if (std::ranges::find(kObservers, cell.fault->target) != kObservers.end())
+        plan.observers.insert(cell.fault->target);
+    if (plan.observers.contains("daemon")) plan.observers.insert("gateway");
     plan.instance = next_name();
     plan.folder = options_.out / plan.instance;
     const std::size_t before = g.cells.size();
@@ -141,7 +145,8 @@ std::vector<Cell> select_cells(const CampaignOptions& o) {
     for (const Fault& fault : catalogue()) {
       if (!wanted(fault, o)) continue;
       if (fault.injector == Injector::kStart) {
-        if (seed == 1 && !o.phase) cells.push_back({&fault, Phase::kIdle, 1});
+        const bool any_phase = !o.phase || !o.replay.empty();  // a replay is in hover only
+        if (seed == 1 && any_phase) cells.push_back({&fault, Phase::kIdle, 1});
         continue;
       }
       for (const Phase phase : phases_of(fault, o)) cells.push_back({&fault, phase, static_cast<std::uint32_t>(seed)});

@@ -30,8 +30,10 @@ enum class Injector : std::uint8_t {
   kHog,         ///< a SCHED_FIFO thread of priority value spins on the core of control
   kLoad,        ///< stress-ng `what`, bounded
   kRegion,      ///< `what` happens to the shared memory file `target`
-  kDisk,        ///< the recorder writes to a disk of 256 KiB: full within a second
+  kDisk,        ///< the recorder's disk: `what` full (256 KiB), errors (EIO), slow (value ms a write)
+  kCore,        ///< the core of control is taken from the kernel (hot-plug)
   kClock,       ///< CLOCK_REALTIME of the whole machine jumps by value s
+  kBoard,       ///< the whole board: only as the guest's last job (tools/rt_guest/jobs.sh)
   kStart,       ///< hostile input at start: `what`; no flight begins
 };
 
@@ -43,14 +45,15 @@ enum class Promise : std::uint8_t {
   kGuardian,    ///< the guardian speaks, neutral; the flight is started again, disarmed
   kReported,    ///< the heartbeat tells; no arming by itself
   kLineBack,    ///< no wire to judge: gone is seen, and the stream comes back after it
-  kEnds,        ///< the flight ends in order, by its own decision
+  kEnds,        ///< says so, goes on commanding without a gap, lands and disarms, ends in order
+  kRestarts,    ///< the board's watchdog starts it again
   kRefused,     ///< exit code not 0 and `says`, before anything is written
 };
 const char* name_of(Promise promise);
 
 struct Fault {
   std::string_view id = {};
-  int class_number = 0;  ///< of the catalogue, 1 ... 17
+  int class_number = 0;  ///< of the catalogue, 1 ... 18
   Injector injector = Injector::kPoint;
   std::string_view what = {};
   double value = 0;
@@ -66,6 +69,7 @@ struct Fault {
   bool isolated = false;        ///< the flight does not survive it: one for itself
   bool noisy = false;           ///< it disturbs the reference loop too
   bool in_short = false;        ///< part of the short set
+  bool own_machine = false;     ///< changes the whole machine: in the guest only
 };
 
 }  // namespace wasp::faults

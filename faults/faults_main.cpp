@@ -24,7 +24,7 @@ std::atomic<bool> stop_requested{false};
 struct Options {
   CampaignOptions campaign;
   std::string phase, json;
-  bool list = false, negative = false, own_machine = false, no_guardian = false, no_rt = false;
+  bool list = false, negative = false, untimed = false, own_machine = false, no_guardian = false, no_rt = false;
   int class_number = 0;
   double soak_s = 0;
 };
@@ -40,7 +40,7 @@ void declare(CLI::App& app, Options& o) {
   app.option_defaults()->always_capture_default();
   app.add_flag("--list", o.list, "only print the catalogue: fault, class, what is promised, phases");
   app.add_option("--only", o.campaign.only, "faults whose name matches this regular expression");
-  app.add_option("--class", o.class_number, "faults of this class, 1 ... 17 (0: all)")->check(CLI::Range(0, 17));
+  app.add_option("--class", o.class_number, "faults of this class, 1 ... 18 (0: all)")->check(CLI::Range(0, 18));
   app.add_option("--phase", o.phase, "in this phase only: idle, take-off, hover, cruise, landing")
       ->check(CLI::IsMember(kPhaseNames));
   app.add_option("--seeds", o.campaign.seeds, "repeat everything with so many seeds of world, noise and moment")
@@ -48,6 +48,7 @@ void declare(CLI::App& app, Options& o) {
   app.add_flag("--short", o.campaign.short_set,
                "a dozen faults in one phase each, times not judged: only whether detection, answer and recovery came "
                "and the wire stayed within its limits");
+  app.add_flag("--untimed", o.untimed, "times are not judged: for machines whose times mean nothing");
   app.add_flag("--isolate", o.campaign.isolate, "a flight for each fault, none shared");
   app.add_flag("--negative", o.negative,
                "negative controls: flights weakened on purpose, whose cells must come out as MISS");
@@ -61,7 +62,8 @@ void declare(CLI::App& app, Options& o) {
   app.add_option("--replay", o.campaign.replay,
                  "fly on this recording instead of the simulated camera, in hover only: where nothing can render")
       ->check(CLI::ExistingDirectory);
-  app.add_flag("--own-machine", o.own_machine, "this machine is nobody else's: its clock may be changed");
+  app.add_flag("--own-machine", o.own_machine,
+               "this machine is nobody else's: its clock, cores and limits may be changed");
   app.add_option("--out", o.campaign.out, "folder for the flights' files");
   app.add_option("--json", o.json, "write all results to this file");
 }
@@ -79,7 +81,7 @@ int fly(const Options& o) {
   if (o.no_rt) abilities.real_time = false;
   if (!abilities.real_time) std::cout << "NOT REAL TIME: no time of this run says anything of a flight that is\n";
   CampaignOptions campaign = o.campaign;
-  campaign.times = !campaign.short_set;
+  campaign.times = !campaign.short_set && !o.untimed;
   campaign.guarded = !o.no_guardian;
   if (o.no_guardian) abilities.guardian = false;
   if (o.soak_s > 0)

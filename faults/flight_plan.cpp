@@ -109,8 +109,8 @@ const char* name_of(Phase phase) {
 }
 
 const char* name_of(Promise promise) {
-  constexpr std::array kNames = {"neutral",  "unaffected", "within limits", "guardian",
-                                 "reported", "line back",  "ends",          "refused"};
+  constexpr std::array kNames = {"neutral",   "unaffected", "within limits", "guardian", "reported",
+                                 "line back", "ends",       "restarts",      "refused"};
   return kNames[static_cast<std::size_t>(promise)];
 }
 
@@ -120,10 +120,9 @@ Abilities find_abilities() {
   a.real_time = ask({wasp, "flight", "--check-rights"}).first == 0;
   a.fault_points = ask({wasp, "flight", "--help"}).second.find("--fault-socket") != std::string::npos;
   a.guardian = ask({wasp, "guard", "--help"}).first == 0;
-#ifdef WASP_WITHOUT_RENDERER
-  a.renderer = false;
-#else
+#ifndef WASP_WITHOUT_RENDERER
   a.renderer = true;
+  a.gateway = ask({tools::program("wasp-iceoryx"), "--help"}).first == 0;
 #endif
   return a;
 }
@@ -164,8 +163,11 @@ std::vector<std::string> camera_arguments(const FlightPlan& plan) {
   return a;
 }
 
-std::vector<std::string> recorder_arguments(const FlightPlan& plan) {
-  return {tools::program("wasp-record"), "--instance", plan.instance, "--out", plan.folder.string()};
+std::vector<std::string> observer_arguments(const FlightPlan& plan, std::string_view observer) {
+  if (observer == "monitor") return {tools::program("wasp-top"), "--instance", plan.instance, "--period-s", "0.05"};
+  if (observer == "gateway")
+    return {tools::program("wasp-iceoryx"), "export", "--instance", plan.instance, "--all", "--wait", "60"};
+  return {tools::program("wasp-record"), "--instance", plan.instance};
 }
 
 std::vector<std::string> flight_arguments(const FlightPlan& plan) {

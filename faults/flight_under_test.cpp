@@ -2,15 +2,16 @@
 
 #include <fmt/format.h>
 #include <signal.h>
+#include <sys/prctl.h>
 #include <sys/socket.h>
 #include <sys/un.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
-#include <regex>
 #include <stdexcept>
 
 #include "control/mission.h"
@@ -110,7 +111,10 @@ FlightUnderTest::FlightUnderTest(const FlightPlan& plan) : plan_(plan) {
     wait_until_there("/dev/shm/" + shm::camera_region(plan_.instance), *camera_);
   }
   watch_ = std::make_unique<FlightWatch>(plan_.instance);
-  if (plan_.recorder) start_recorder();
+  if (plan_.observers.contains("gateway") || plan_.observers.contains("daemon"))
+    daemon_ = std::make_unique<GatewayDaemon>();
+  for (const auto observer : kObservers)
+    if (plan_.observers.contains(observer) && observer != "daemon") start_observer(observer);
   reference_ = start_reference();
   flight_.emplace(flight_arguments(plan_), (plan_.folder / "flight.txt").string());
 }
@@ -118,7 +122,12 @@ FlightUnderTest::FlightUnderTest(const FlightPlan& plan) : plan_(plan) {
 FlightUnderTest::~FlightUnderTest() {
   end(1);
   reference_.reset();
-  for (auto* child : {&recorder_, &camera_, &sim_})
+  for (auto& [name, observer] : observers_) {
+    observer.signal(SIGCONT);
+    observer.end(SIGTERM, 5);
+  }
+  daemon_.reset();
+  for (auto* child : {&camera_, &sim_})
     if (*child) {
       (*child)->signal(SIGCONT);
       (*child)->end(SIGTERM, 5);
@@ -144,9 +153,14 @@ void FlightUnderTest::start_camera() {
   camera_.emplace(camera_arguments(plan_), (plan_.folder / "camera.txt").string());
 }
 
-void FlightUnderTest::start_recorder() {
-  recorder_.reset();
-  recorder_.emplace(recorder_arguments(plan_), (plan_.folder / "recorder.txt").string());
+void FlightUnderTest::start_observer(std::string_view name) {
+  observers_.erase(std::string(name));
+  auto arguments = observer_arguments(plan_, name);
+  if (name == "recorder") {
+    recording_ = plan_.folder / fmt::format("recording-{}", ++recordings_);
+    arguments.insert(arguments.end(), {"--out", recording_.string()});
+  }
+  observers_.try_emplace(std::string(name), arguments, (plan_.folder / fmt::format("{}.txt", name)).string());
 }
 
 void FlightUnderTest::start_recorder_on_small_disk() {
@@ -154,13 +168,34 @@ void FlightUnderTest::start_recorder_on_small_disk() {
   fs::create_directories(disk);
   const std::string script =
       fmt::format("mount -t tmpfs -o size=256k tmpfs '{0}' && exec {1} --instance {2} --out '{0}'", disk.string(),
-                  recorder_arguments(plan_).front(), plan_.instance);
-  recorder_.reset();
-  recorder_.emplace(std::vector<std::string>{"/usr/bin/unshare", "-m", "/bin/sh", "-c", script},
-                    (plan_.folder / "recorder.txt").string());
+                  observer_arguments(plan_, "recorder").front(), plan_.instance);
+  observers_.erase("recorder");
+  observers_.try_emplace("recorder", std::vector<std::string>{"/usr/bin/unshare", "-m", "/bin/sh", "-c", script},
+                         (plan_.folder / "recorder.txt").string());
 }
 
-bool FlightUnderTest::running() { return flight_ && !flight_->poll(); }
+RecorderAccount FlightUnderTest::recorder_account() {
+  const auto recorder = observers_.find("recorder");
+  if (recorder == observers_.end()) return {};
+  recorder->second.signal(SIGCONT);
+  recorder->second.end(SIGTERM, 20);
+  return read_account(recording_);
+}
+
+std::optional<int> FlightUnderTest::exit_code() {
+  if (orphan_ <= 0) return flight_->poll();
+  int status = 0;
+  if (!orphan_code_ && waitpid(orphan_, &status, WNOHANG) == orphan_)
+    orphan_code_ = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  return orphan_code_;
+}
+
+void FlightUnderTest::orphan_flight() {
+  prctl(PR_SET_CHILD_SUBREAPER, 1);  // else nobody could tell how it ends
+  orphan_ = pid_of("flight");
+}
+
+bool FlightUnderTest::running() { return flight_ && !exit_code(); }
 
 bool FlightUnderTest::wait_for(Phase phase, double patience_s) {
   const TimeNs deadline_ns = rt::now() + from_seconds(patience_s);
@@ -188,7 +223,17 @@ int FlightUnderTest::end(double patience_s) {
   if (const pid_t flying = pid_of("flight"); flying > 0) kill(flying, SIGCONT);
   flight_->signal(SIGCONT);
   if (!flight_->poll()) flight_->signal(SIGINT);
+  if (orphan_ > 0) end_orphan(patience_s);
   return flight_->end(SIGINT, patience_s);
+}
+
+void FlightUnderTest::end_orphan(double patience_s) {
+  const TimeNs deadline_ns = rt::now() + from_seconds(patience_s);
+  while (!exit_code() && rt::now() < deadline_ns) rt::sleep_until(rt::now() + 5 * kMillisecond);
+  if (exit_code()) return;
+  kill(orphan_, SIGKILL);
+  waitpid(orphan_, nullptr, 0);
+  orphan_code_ = 128 + SIGKILL;
 }
 
 pid_t FlightUnderTest::pid_of(std::string_view name) const {
@@ -196,9 +241,11 @@ pid_t FlightUnderTest::pid_of(std::string_view name) const {
   const auto pid = [](const std::optional<tools::ChildProcess>& child) { return child ? child->pid() : -1; };
   if (name == "sim") return pid(sim_);
   if (name == "camera") return pid(camera_);
-  if (name == "recorder") return pid(recorder_);
+  if (name == "daemon") return daemon_ ? daemon_->pid() : -1;
+  if (const auto observer = observers_.find(name); observer != observers_.end()) return observer->second.pid();
   if (name == "guardian") return guarded ? pid(flight_) : -1;
   if (!guarded) return pid(flight_);
+  if (orphan_ > 0) return orphan_code_ ? -1 : orphan_;
   const auto children = flight_ ? children_of(flight_->pid()) : std::vector<pid_t>{};
   return children.empty() ? -1 : children.front();
 }
@@ -241,16 +288,6 @@ std::vector<LogLine> FlightUnderTest::log() const {
     lines.push_back({rest == line.c_str() ? 0 : from_seconds(seconds), line});
   }
   return lines;
-}
-
-std::uint64_t FlightUnderTest::records_lost() const {
-  static const std::regex kLost(R"(: (\d+) lost)");
-  std::ifstream file(plan_.folder / "recorder.txt");
-  std::uint64_t lost = 0;
-  std::smatch m;
-  for (std::string line; std::getline(file, line);)
-    if (std::regex_search(line, m, kLost)) lost += std::stoull(m[1]);
-  return lost;
 }
 
 std::vector<tools::Wakeup> FlightUnderTest::reference() {

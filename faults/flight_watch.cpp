@@ -10,7 +10,7 @@ namespace wasp::faults {
 namespace {
 
 constexpr DurationNs kLook = 10 * kMillisecond;
-constexpr DurationNs kPause = 80 * kMillisecond;
+constexpr DurationNs kPause = 85 * kMillisecond;  // a tick and a step before cues of that exposure are too old
 
 /// A region and one of its rings, found again while it is not there yet.
 struct Attachment {
@@ -98,10 +98,7 @@ void FlightWatch::look() {
       const TimeNs before_ns = exposures_.empty() ? header.exposed_at_ns : exposures_.back();
       note_loss(*rings_->camera.ring, exposures_lost_, {before_ns, header.exposed_at_ns}, exposures_unseen_);
       exposures_.push_back(header.exposed_at_ns);
-      const TimeNs seen_ns = sample.published_at_ns;
-      if (frame_seen_at_ns_ != 0 && seen_ns - frame_seen_at_ns_ > kPause)
-        camera_pauses_.push_back({frame_seen_at_ns_, seen_ns});
-      frame_seen_at_ns_ = seen_ns;
+      if (sample.published_at_ns - before_ns > kPause) camera_pauses_.push_back({before_ns, sample.published_at_ns});
     }
   }
   if (rings_->truth.attach(shm::truth_region(instance_), shm::kTruth, "Truth")) rings_->truth.ring->copy_newest(truth_);

@@ -39,7 +39,8 @@ class FlightWatch {
   [[nodiscard]] std::vector<Stretch> commands_unseen() const;   ///< we looked too late: they were overwritten
   [[nodiscard]] std::vector<Stretch> exposures_unseen() const;  ///< likewise
   [[nodiscard]] std::vector<TimeNs> exposures() const;          ///< of the front camera, rising as published
-  /// No new frame for more than 80 ms: a camera that is late by itself, if nothing was done to it.
+  /// From an exposure to the next frame's arrival, where that took so long that nothing usable was left meanwhile: a
+  /// camera that is late by itself, if nothing was done to it.
   [[nodiscard]] std::vector<Stretch> camera_pauses() const;
   [[nodiscard]] FlightCounts counts() const;
   [[nodiscard]] Truth truth() const;
@@ -60,7 +61,6 @@ class FlightWatch {
   Truth truth_;
   TimeNs phase_since_ns_ = 0;
   std::vector<Stretch> commands_unseen_, exposures_unseen_, camera_pauses_;
-  TimeNs frame_seen_at_ns_ = 0;
   std::uint64_t commands_lost_ = 0, exposures_lost_ = 0;
   std::atomic<bool> stop_{false};
   rt::Thread thread_;  // joined first

@@ -5,7 +5,9 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
+#include <fstream>
 #include <memory>
 #include <optional>
 
@@ -19,6 +21,7 @@ namespace {
 
 constexpr int kControlCore = 1;
 constexpr const char* kStress = "/usr/bin/stress-ng";
+constexpr const char* kTracer = "/usr/bin/strace";
 constexpr float kForceDisarm = 21196.f, kForceReboot = 20190226.f;
 constexpr std::uint16_t kClockStep = 31010;  // of our simulator: sim/autopilot_link.h
 
@@ -70,6 +73,13 @@ constexpr std::array kLimits = {Named<int>{"memlock", RLIMIT_MEMLOCK}, Named<int
 
 constexpr std::array kUnits = {Named<float>{"gyro", 0}, Named<float>{"accel", 1}, Named<float>{"mag", 2},
                                Named<float>{"baro", 3}};
+
+bool traced(pid_t pid) {
+  std::ifstream status(fmt::format("/proc/{}/status", pid));
+  for (std::string line; std::getline(status, line);)
+    if (line.starts_with("TracerPid:")) return std::stoi(line.substr(10)) != 0;
+  return false;
+}
 
 Injected failed(std::string why) { return {rt::now(), std::move(why), {}}; }
 
@@ -139,10 +149,13 @@ Injected signal_process(const Fault& f, FlightUnderTest& flight) {
   const auto number = find(kSignals, f.what);
   const pid_t pid = flight.pid_of(f.target);
   if (!number || pid <= 0) return failed(fmt::format("no process '{}'", f.target));
+  if (f.target == "guardian" && *number == SIGKILL) flight.orphan_flight();
   const TimeNs at_ns = rt::now();
   if (kill(pid, *number) != 0) return failed("it is gone");
   if (*number == SIGSTOP) return {at_ns, {}, [pid] { kill(pid, SIGCONT); }};
   if (f.target == "camera") return {at_ns, {}, [&flight] { flight.start_camera(); }};
+  const bool observer = std::ranges::find(kObservers, f.target) != kObservers.end() && f.target != "daemon";
+  if (observer) return {at_ns, {}, [&flight, name = f.target] { flight.start_observer(name); }};
   return {at_ns, {}, {}};
 }
 
@@ -229,6 +242,31 @@ Injected tamper_region(const Fault& f, FlightUnderTest& flight, std::uint32_t se
   return {at_ns, {}, {}};
 }
 
+/// Every write of the recorder fails with EIO, or takes `value` ms more: the kernel's own system calls, by strace.
+Injected spoil_disk(const Fault& f, FlightUnderTest& flight) {
+  const pid_t recorder = flight.pid_of("recorder");
+  const bool slow = f.what == "slow";
+  const std::string how = slow ? fmt::format("delay_enter={:.0f}", f.value * 1e3) : std::string("error=EIO");
+  const TimeNs at_ns = rt::now();
+  auto tracer = std::make_shared<tools::ChildProcess>(
+      std::vector<std::string>{kTracer, "-f", "-qq", "-p", std::to_string(recorder), "-e",
+                               "inject=write,writev,pwrite64,fsync,fdatasync:" + how, "-o", "/dev/null"},
+      (flight.plan().folder / "tracer.txt").string());
+  while (!traced(recorder) && !tracer->poll() && rt::now() < at_ns + 10 * kSecond)
+    rt::sleep_until(rt::now() + 2 * kMillisecond);
+  if (!traced(recorder)) return failed("the recorder cannot be traced");
+  return {at_ns, {}, [tracer]() mutable { tracer->end(SIGINT, 10), tracer.reset(); }};
+}
+
+/// The core of control, as a machine without it: its threads are moved by the kernel.
+Injected take_core() {
+  const int core = rt::nearest_usable_core(kControlCore);
+  const std::string file = fmt::format("/sys/devices/system/cpu/cpu{}/online", core);
+  const TimeNs at_ns = rt::now();
+  if (!(std::ofstream(file) << 0).flush()) return failed(file + " cannot be written: the machine keeps this core");
+  return {at_ns, {}, [file] { std::ofstream(file) << 1; }};
+}
+
 bool shift_wall_clock(double seconds) {
   timespec wall{};
   clock_gettime(CLOCK_REALTIME, &wall);
@@ -270,12 +308,16 @@ Injected inject(const Fault& fault, FlightUnderTest& flight, std::uint32_t seed)
       case Injector::kRegion:
         return tamper_region(fault, flight, seed);
       case Injector::kDisk: {
+        if (fault.what != "full") return spoil_disk(fault, flight);
         const TimeNs at_ns = rt::now();
         flight.start_recorder_on_small_disk();
         return {at_ns, {}, {}};
       }
+      case Injector::kCore:
+        return take_core();
       case Injector::kClock:
         return jump_wall_clock(fault);
+      case Injector::kBoard:
       case Injector::kStart:
         break;
     }
@@ -294,17 +336,20 @@ static bool needs_camera(const Fault& fault) {
 }
 
 std::string missing_for(const Fault& fault, const Abilities& abilities) {
+  if (fault.own_machine && !abilities.own_machine) return "changes the whole machine: in the guest only";
   const bool guardian = fault.promise == Promise::kGuardian || fault.target == "guardian";
   if (guardian && !abilities.guardian) return "this wasp has no guardian";
   if (fault.injector == Injector::kPoint && !abilities.fault_points) return "this wasp has no fault points";
   if (fault.injector == Injector::kStart) return {};
+  if (fault.injector == Injector::kBoard) return "the board itself: `wasp rt-guest --arch amd64` does it";
   if (abilities.replay && needs_camera(fault)) return "a replay has no camera process";
   if (!abilities.renderer && !abilities.replay) return "no camera: built without the renderer (--replay does without)";
-  if (fault.injector == Injector::kClock && !abilities.own_machine)
-    return "changes the machine's clock: in the guest only";
   const bool scheduling = fault.injector == Injector::kSteal || fault.injector == Injector::kHog;
   if (scheduling && !abilities.real_time) return "needs real-time rights";
   if (fault.injector == Injector::kLoad && access(kStress, X_OK) != 0) return "needs stress-ng";
+  const bool traced_disk = fault.injector == Injector::kDisk && fault.what != "full";
+  if (traced_disk && access(kTracer, X_OK) != 0) return "needs strace";
+  if ((fault.target == "gateway" || fault.target == "daemon") && !abilities.gateway) return "needs wasp-iceoryx";
   return {};
 }
 

@@ -135,6 +135,7 @@ std::optional<Breach> breach_of(const Fault& fault, const Trial& trial, Phase ph
       return late(fault, trial, r, times);
     case Promise::kBounded:
     case Promise::kEnds:
+    case Promise::kRestarts:
     case Promise::kRefused:
       break;
   }

@@ -3,8 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <limits>
 
+#include "faults/blame.h"
 #include "faults/injector.h"
 #include "rt/clock.h"
 #include "sim/random.h"
@@ -16,13 +16,15 @@ constexpr double kReach_s = 60, kSettle_s = 20;                      // to the p
 constexpr double kRecover_s = 4, kGenerous_s = 40, kLanding_s = 15;  // after a fault, with times judged and without
 constexpr double kAfterwards_s = 0.6;                                // watched after the recovery
 constexpr DurationNs kOverrun = kMillisecond;                        // of the reference loop: one of its periods
-constexpr double kNotExplained = std::numeric_limits<double>::infinity();
-constexpr float kCorridorEnd_m = 22.f;  // of 30
+constexpr float kCorridorEnd_m = 22.f;                               // of 30
 
 /// Promises after which the flight does not command any more.
 bool final(const Fault& fault) {
   return fault.isolated || fault.promise == Promise::kGuardian || fault.promise == Promise::kEnds;
 }
+
+/// Its recorder must lose records, and count them.
+bool tries_the_disk(const Fault& fault) { return fault.injector == Injector::kDisk && fault.what != "full"; }
 
 /// Phases that pass by themselves while faults are done: a flight in them may end.
 bool passes(Phase phase) { return phase == Phase::kTakeOff || phase == Phase::kLanding; }
@@ -51,7 +53,14 @@ DurationNs overlap_ns(const std::vector<Stretch>& stretches, const Stretch& with
 double excess_ms(const Violation& v, const WireLimits& limits) {
   if (v.offence == Offence::kGap) return v.value - to_seconds(limits.longest_gap_ns) * 1e3;
   if (v.offence == Offence::kOldEvidence) return v.value - to_seconds(limits.cue_age_ns) * 1e3;
-  return kNotExplained;
+  return Blame::kNotExplained;
+}
+
+/// The first line with `text` from then on, nullptr: there is none.
+const LogLine* said_since(const std::vector<LogLine>& log, std::string_view text, TimeNs since_ns) {
+  const auto line = std::ranges::find_if(
+      log, [&](const LogLine& l) { return l.at_ns >= since_ns && l.text.find(text) != std::string::npos; });
+  return line == log.end() ? nullptr : &*line;
 }
 
 }  // namespace
@@ -164,9 +173,9 @@ WireEvidence SharedFlight::evidence() const {
   for (const Done& d : done_) {
     const Fault& f = *d.cell.fault;
     const bool silent =
-        f.promise == Promise::kGuardian || f.promise == Promise::kLineBack || f.promise == Promise::kEnds || f.noisy;
+        f.promise == Promise::kGuardian || f.promise == Promise::kLineBack || f.noisy || f.injector == Injector::kCore;
     if (silent) e.gaps_excused.push_back({d.trial.began_ns, d.trial.watched_until_ns});
-    if (f.promise == Promise::kGuardian || f.promise == Promise::kEnds)
+    if (f.promise == Promise::kGuardian)
       e.not_joined.push_back({d.trial.began_ns - 100 * kMillisecond, d.trial.watched_until_ns});
     if (f.tainted_after_ms > 0)
       // an exposure is relayed up to 60 ms later: those at the end meet a fault that is over
@@ -181,80 +190,101 @@ std::vector<CellResult> SharedFlight::judge() {
   if (!options_.times) limits.longest_gap_ns = limits.slack_ns = kSecond;
   const std::vector<Violation> violations = check_wire(flight_.wire(), limits, evidence());
   const std::vector<tools::Wakeup> reference = flight_.reference();
+  account_ = flight_.recorder_account();
   std::vector<CellResult> results;
   for (const Done& d : done_) results.push_back(judge(d, limits, violations, reference));
   return results;
 }
 
-CellResult SharedFlight::judge(const Done& d, const WireLimits& limits, const std::vector<Violation>& violations,
-                               const std::vector<tools::Wakeup>& reference) {
-  const Fault& fault = *d.cell.fault;
-  CellResult r{.cell = d.cell, .verdict = Verdict::kOk, .why = {}, .outcome = d.outcome};
-  r.folder = plan_.folder;
-  if (d.interrupted) return r.verdict = Verdict::kSkipped, r.why = "interrupted", r;
-  r.records_lost = flight_.records_lost();
-  r.reaction = react(flight_.wire(), d.trial);
-  std::vector<LogLine> log = flight_.log();
-  if (fault.promise == Promise::kLineBack) {
-    const auto gone = std::ranges::find_if(log, [&](const LogLine& l) {
-      return l.at_ns >= d.trial.began_ns && l.text.find("serial line gone") != std::string::npos;
-    });
-    read_line(flight_.wire(), d.trial, gone == log.end() ? kForever : gone->at_ns, r.reaction);
+/// What came of the fault, from the wire and, where no wire tells, from the log and the ring.
+Reaction SharedFlight::reaction_of(const Done& d, const std::vector<LogLine>& log) {
+  Reaction reaction = react(flight_.wire(), d.trial);
+  const Promise promise = d.cell.fault->promise;
+  if (promise == Promise::kLineBack) {
+    const LogLine* gone = said_since(log, "serial line gone", d.trial.began_ns);
+    read_line(flight_.wire(), d.trial, gone == nullptr ? kForever : gone->at_ns, reaction);
   }
-  if (fault.promise == Promise::kGuardian) read_restart(flight_.watch().commands(), d.trial, r.reaction);
-  const bool only = done_.size() == 1;
+  if (promise == Promise::kGuardian) read_restart(flight_.watch().commands(), d.trial, reaction);
+  return reaction;
+}
+
+/// Those between this fault and the next.
+std::vector<Violation> SharedFlight::violations_of(const Done& d, const std::vector<Violation>& all) const {
+  if (done_.size() == 1) return all;
   TimeNs next_ns = kForever;
   for (const Done& other : done_)
     if (other.trial.began_ns > d.trial.began_ns) next_ns = std::min(next_ns, other.trial.began_ns);
-  const auto belongs = [&](const Violation& v) { return only || (v.at_ns >= d.trial.began_ns && v.at_ns < next_ns); };
-  std::ranges::copy_if(violations, std::back_inserter(r.violations), belongs);
+  std::vector<Violation> own;
+  std::ranges::copy_if(all, std::back_inserter(own),
+                       [&](const Violation& v) { return v.at_ns >= d.trial.began_ns && v.at_ns < next_ns; });
+  return own;
+}
 
+void SharedFlight::judge_breach(const Done& d, const CellResult& r, Blame& blame) {
+  const auto breach = breach_of(*d.cell.fault, d.trial, d.cell.phase, r.reaction, options_.times);
+  if (!breach) return;
+  const TimeNs alarm_ns = d.trial.began_ns + from_seconds(r.reaction.detected_ms.value_or(0) * 1e-3);
+  const Stretch before{alarm_ns - 300 * kMillisecond, alarm_ns};
+  const bool camera_late = d.cell.fault->promise == Promise::kUnaffected && r.reaction.detected_ms &&
+                           overlap_ns(flight_.watch().camera_pauses(), before) > 0;
+  if (camera_late)
+    blame.noise("alarm: the camera's process was late");
+  else
+    blame.late(breach->why, breach->excess_ms, breach->waited);
+}
+
+void SharedFlight::judge_outcome(const Done& d, const CellResult& r, Blame& blame) {
+  const Fault& fault = *d.cell.fault;
+  const bool may_end = final(fault) || passes(plan_.phase);
+  if (!may_end && d.outcome != "goes on") blame.broken("the flight did not go on: " + d.outcome);
+  if (d.counts.incarnation > 0 && fault.promise != Promise::kGuardian)
+    blame.broken("the flight process died and was started again");
+  if (d.crashed) blame.broken("crashed: " + d.outcome);
+  if (fault.promise == Promise::kEnds && d.outcome.starts_with("flies on")) blame.broken("it did not end");
+  if (fault.promise == Promise::kEnds && flight_.wire().armed()) blame.broken("the vehicle was left armed");
+  if (!tries_the_disk(fault)) return;
+  if (!account_.wrong.empty()) blame.broken(account_.wrong);
+  if (r.records_lost == 0) blame.broken("nothing was lost to the disk: it was none");
+}
+
+void SharedFlight::judge_words(const Done& d, const std::vector<LogLine>& log, CellResult& r, Blame& blame) {
+  const Fault& fault = *d.cell.fault;
+  if (fault.says.empty() || !answers_in(fault, d.cell.phase)) return;
+  const LogLine* said = said_since(log, fault.says, d.trial.began_ns - 5 * kMillisecond);
+  if (said == nullptr) return blame.broken(fmt::format("nobody says '{}'", fault.says));
+  const double after_ms = to_seconds(said->at_ns - d.trial.began_ns) * 1e3;
+  if (!r.reaction.detected_ms) r.reaction.detected_ms = std::max(0.0, after_ms);
+  const bool timed = fault.promise == Promise::kBounded || fault.promise == Promise::kEnds;
+  if (options_.times && timed && fault.detected_ms > 0 && after_ms > fault.detected_ms)
+    blame.late(fmt::format("said after {:.0f} ms, promised {:.0f}", after_ms, fault.detected_ms),
+               after_ms - fault.detected_ms, {d.trial.began_ns, said->at_ns});
+}
+
+CellResult SharedFlight::judge(const Done& d, const WireLimits& limits, const std::vector<Violation>& violations,
+                               const std::vector<tools::Wakeup>& reference) {
+  CellResult r{.cell = d.cell, .verdict = Verdict::kOk, .why = {}, .outcome = d.outcome};
+  r.folder = plan_.folder;
+  if (d.interrupted) return r.verdict = Verdict::kSkipped, r.why = "interrupted", r;
+  const std::vector<LogLine> log = flight_.log();
+  r.records_lost = account_.lost + account_.refused;
+  r.reaction = reaction_of(d, log);
+  r.violations = violations_of(d, violations);
   const std::vector<Stretch> stalls = flight_.tap().stalls();
-  const auto host_late_ms = [&](const Stretch& waited) {
-    return to_seconds((fault.noisy ? 0 : reference_late_ns(reference, waited)) + overlap_ns(stalls, waited)) * 1e3;
-  };
-  const auto blame = [&](const std::string& why, double excess, const Stretch& waited) {
-    const double late_ms = excess < kNotExplained ? host_late_ms(waited) : 0;
-    const bool noise = late_ms > 0 && excess <= late_ms + 1;
-    if (r.verdict == Verdict::kMiss || (r.verdict == Verdict::kHostNoise && noise)) return;
-    r.verdict = noise ? Verdict::kHostNoise : Verdict::kMiss;
-    r.why = noise ? fmt::format("{} (the host stood still for {:.1f} ms)", why, late_ms) : why;
-  };
-  const auto blame_for_good = [&](const std::string& why) { blame(why, kNotExplained, {}); };
-  const auto blame_breach = [&](const Breach& breach) {
-    const TimeNs alarm_ns = d.trial.began_ns + from_seconds(r.reaction.detected_ms.value_or(0) * 1e-3);
-    const Stretch before{alarm_ns - 300 * kMillisecond, alarm_ns};
-    const bool camera_late = fault.promise == Promise::kUnaffected && r.reaction.detected_ms &&
-                             overlap_ns(flight_.watch().camera_pauses(), before) > 0;
-    if (!camera_late) return blame(breach.why, breach.excess_ms, breach.waited);
-    if (r.verdict == Verdict::kOk) r.verdict = Verdict::kHostNoise, r.why = "alarm: the camera's process was late";
-  };
-  if (!d.error.empty()) blame_for_good(d.error);
-  if (const auto breach = breach_of(fault, d.trial, d.cell.phase, r.reaction, options_.times)) blame_breach(*breach);
+  Blame blame(r, [&](const Stretch& waited) {
+    const DurationNs late_ns = d.cell.fault->noisy ? 0 : reference_late_ns(reference, waited);
+    return to_seconds(late_ns + overlap_ns(stalls, waited)) * 1e3;
+  });
+  if (!d.error.empty()) blame.broken(d.error);
+  judge_breach(d, r, blame);
   for (const Violation& v : r.violations) {
     const std::string why = fmt::format("{} on the wire ({:.3g})", name_of(v.offence), v.value);
-    const double excess = excess_ms(v, limits);
-    if (excess > v.held_ms)
-      blame(why, excess, {v.at_ns - kSecond, v.at_ns});
-    else if (r.verdict == Verdict::kOk)
-      r.verdict = Verdict::kHostNoise, r.why = why + fmt::format(", held by the line for {:.1f} ms", v.held_ms);
+    if (const double excess = excess_ms(v, limits); excess > v.held_ms)
+      blame.late(why, excess, {v.at_ns - kSecond, v.at_ns});
+    else
+      blame.noise(why + fmt::format(", held by the line for {:.1f} ms", v.held_ms));
   }
-  const bool may_end = final(fault) || passes(plan_.phase);
-  if (!may_end && d.outcome != "goes on") blame_for_good("the flight did not go on: " + d.outcome);
-  if (d.counts.incarnation > 0 && fault.promise != Promise::kGuardian)
-    blame_for_good("the flight process died and was started again");
-  if (d.crashed && fault.id != "guardian-killed") blame_for_good("crashed: " + d.outcome);
-  if (!fault.says.empty() && answers_in(fault, d.cell.phase)) {
-    const auto said = std::ranges::find_if(log, [&](const LogLine& l) {
-      return l.at_ns >= d.trial.began_ns - 5 * kMillisecond && l.text.find(fault.says) != std::string::npos;
-    });
-    if (said == log.end()) return blame_for_good(fmt::format("nobody says '{}'", fault.says)), r;
-    const double after_ms = to_seconds(said->at_ns - d.trial.began_ns) * 1e3;
-    if (!r.reaction.detected_ms) r.reaction.detected_ms = std::max(0.0, after_ms);
-    if (options_.times && fault.promise == Promise::kBounded && fault.detected_ms > 0 && after_ms > fault.detected_ms)
-      blame(fmt::format("said after {:.0f} ms, promised {:.0f}", after_ms, fault.detected_ms),
-            after_ms - fault.detected_ms, {d.trial.began_ns, said->at_ns});
-  }
+  judge_outcome(d, r, blame);
+  judge_words(d, log, r, blame);
   return r;
 }
 

@@ -6,6 +6,7 @@
 #include <functional>
 #include <vector>
 
+#include "faults/blame.h"
 #include "faults/campaign.h"
 #include "faults/flight_under_test.h"
 
@@ -33,6 +34,11 @@ class SharedFlight {
   void wait_for_answer(const Cell& cell);
   [[nodiscard]] std::string outcome();
   std::vector<CellResult> judge();
+  Reaction reaction_of(const Done& done, const std::vector<LogLine>& log);
+  [[nodiscard]] std::vector<Violation> violations_of(const Done& done, const std::vector<Violation>& all) const;
+  void judge_breach(const Done& done, const CellResult& result, Blame& blame);
+  void judge_outcome(const Done& done, const CellResult& result, Blame& blame);
+  void judge_words(const Done& done, const std::vector<LogLine>& log, CellResult& result, Blame& blame);
   CellResult judge(const Done& done, const WireLimits& limits, const std::vector<Violation>& violations,
                    const std::vector<tools::Wakeup>& reference);
   [[nodiscard]] WireEvidence evidence() const;
@@ -42,6 +48,7 @@ class SharedFlight {
   const CampaignHooks& hooks_;
   FlightUnderTest flight_;
   std::vector<Done> done_;
+  RecorderAccount account_;  ///< of the recorder, when it is over
 };
 
 }  // namespace wasp::faults

@@ -194,7 +194,7 @@ int run_soak(const SoakOptions& options, const Abilities& abilities, const std::
   FlightPlan plan;
   plan.phase = Phase::kHover, plan.seed = options.seed;
   plan.abilities = abilities;
-  plan.recorder = true;
+  plan.observers = {"recorder"};
   plan.instance = fmt::format("faults-{}-soak", getpid());
   plan.folder = options.out / plan.instance;
   return Soak(options, plan, interrupted).run();

@@ -69,6 +69,19 @@ constexpr std::array kRows = {
     StartRow{"shm full", "",
              "unshare -m sh -c 'mount -t tmpfs -o size=64k tmpfs /dev/shm && exec $wasp flight --no-rt --instance "
              "$name --config $good'"},
+    StartRow{"budget", "1000\n",
+             "unshare -m sh -c 'mount --bind $bad /proc/sys/kernel/sched_rt_runtime_us && exec $wasp flight --instance "
+             "$name --config $good'"},
+    StartRow{"budget of the kernel", "",
+             "kernel=/proc/sys/kernel/sched_rt_runtime_us; before=$(cat $kernel); echo 1000 >$kernel; $wasp flight "
+             "--instance $name --config $good; code=$?; echo $before >$kernel; exit $code"},
+    StartRow{"time namespace", "",
+             "unshare --time --monotonic 3600 --fork $wasp flight --no-rt --instance $name --config $good"},
+    StartRow{"stale layout", "", "$wasp flight --no-rt --instance $name --config $good"},
+    StartRow{"no watchdog", "[guardian]\nwatchdog = \"/dev/absent\"\n",
+             "$wasp guard --no-rt --instance $name --config $good --config $bad"},
+    StartRow{"not a watchdog", "[guardian]\nwatchdog = \"/dev/null\"\n",
+             "$wasp guard --no-rt --instance $name --config $good --config $bad"},
     StartRow{"no descriptors", "", "ulimit -n 6; exec $wasp flight --no-rt --instance $name --config $good"},
 };
 
@@ -85,6 +98,13 @@ std::string read_all(const fs::path& path) {
   return text.str();
 }
 
+/// Over a word of a shared memory file, as another version of wasp would have written it.
+void write_word(const std::string& region, std::size_t at, std::uint32_t value) {
+  std::fstream file("/dev/shm/" + region, std::ios::binary | std::ios::in | std::ios::out);
+  file.seekp(static_cast<std::streamoff>(at));
+  file.write(reinterpret_cast<const char*>(&value), sizeof value);
+}
+
 /// What a flight needs besides its files, and for some cells a flight that is there already.
 struct Surroundings {
   Surroundings(std::string_view what, const fs::path& folder, const std::string& name)
@@ -95,6 +115,7 @@ struct Surroundings {
     const std::vector<shm::TopicSpec> streams{{shm::kGray, "Frame", TopicKind::kRing, 4, 4096},
                                               {shm::kDepth, "Frame", TopicKind::kRing, 4, 4096}};
     if (what != "broken world") camera = shm::Region::create(shm::camera_region(name), streams);
+    if (what == "stale layout") write_word(shm::camera_region(name), offsetof(shm::RegionHeader, layout_version), 1);
     const std::vector<shm::TopicSpec> command{{shm::kCommand, "Command", TopicKind::kRing, 4, sizeof(Command)}};
     if (what == "second flight") flight = shm::Region::create(shm::flight_region(name), command);
   }

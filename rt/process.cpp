@@ -9,9 +9,9 @@
 #include <sys/utsname.h>
 #include <unistd.h>
 
+#include <array>
 #include <cerrno>
 #include <cstdint>
-#include <array>
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
@@ -51,6 +51,22 @@ bool memlock_permitted(std::size_t bytes) {
   return permitted;
 }
 
+bool memory_is_locked = false;  // what may be locked has been; trying once more would fill a mapping with pages
+
+constexpr double kLeastRealTimeShare = 0.5;  // of every period: less, and the kernel stops threads in mid-flight
+
+/// What the kernel grants all SCHED_FIFO threads of a core, "1000 of every 1000000 us", if that is too little for a
+/// flight; sched(7), sched_rt_runtime_us.
+std::string real_time_budget_short() {
+  long runtime_us = 0, period_us = 0;
+  if (!(std::ifstream("/proc/sys/kernel/sched_rt_runtime_us") >> runtime_us) ||
+      !(std::ifstream("/proc/sys/kernel/sched_rt_period_us") >> period_us))
+    return {};
+  if (runtime_us < 0 || static_cast<double>(runtime_us) >= kLeastRealTimeShare * static_cast<double>(period_us))
+    return {};
+  return std::to_string(runtime_us) + " of every " + std::to_string(period_us) + " us";
+}
+
 }  // namespace
 
 std::string grant_command() {
@@ -62,10 +78,13 @@ std::string grant_command() {
 std::vector<MissingRight> missing_rights(int priority) {
   std::vector<MissingRight> missing;
   if (!fifo_permitted(priority))
-    missing.push_back({"SCHED_FIFO priority " + std::to_string(priority) + " (CAP_SYS_NICE or rtprio limit)",
-                       grant_command()});
+    missing.push_back(
+        {"SCHED_FIFO priority " + std::to_string(priority) + " (CAP_SYS_NICE or rtprio limit)", grant_command()});
+  if (const std::string budget = real_time_budget_short(); !budget.empty())
+    missing.push_back({"real-time budget (the kernel grants SCHED_FIFO threads " + budget + ")",
+                       "sudo sysctl kernel.sched_rt_runtime_us=950000"});
   const std::size_t needed_bytes = memlock_needed_bytes();
-  if (!memlock_permitted(needed_bytes))
+  if (!memory_is_locked && !memlock_permitted(needed_bytes))
     missing.push_back(
         {"locked memory (CAP_IPC_LOCK or memlock limit, " + std::to_string(needed_bytes >> 20) + " MiB needed)",
          grant_command() + ", or 'ulimit -l unlimited'"});
@@ -77,6 +96,7 @@ std::string lock_memory(std::size_t heap_bytes) {
   mallopt(M_MMAP_MAX, 0);         // never mmap single allocations
   mallopt(M_ARENA_MAX, 1);        // one arena, prefaulted below
   if (mlockall(MCL_CURRENT | MCL_FUTURE) != 0) return std::string("mlockall: ") + std::strerror(errno);
+  memory_is_locked = true;
   auto* heap = static_cast<volatile char*>(std::malloc(heap_bytes));
   if (heap == nullptr) return "prefault: heap of " + std::to_string(heap_bytes) + " bytes not available";
   for (std::size_t i = 0; i < heap_bytes; i += 4096) heap[i] = 0;

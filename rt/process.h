@@ -16,7 +16,8 @@ struct MissingRight {
 /// The command that grants this program SCHED_FIFO and locked memory.
 std::string grant_command();
 
-/// Checks, without changing anything that lasts: SCHED_FIFO at `priority`, and enough memlock for a locked process.
+/// Checks, without changing anything that lasts: SCHED_FIFO at `priority`, a budget for it (sched_rt_runtime_us), and
+/// enough memlock for a locked process.
 std::vector<MissingRight> missing_rights(int priority);
 
 /// mlockall(current and future), malloc tuned to keep what it has, and a prefaulted heap. Empty on success, else why.

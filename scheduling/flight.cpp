@@ -454,6 +454,10 @@ int flight_main(const BehaviourTable& behaviours, int argc, char** argv) {
   try {
     Config config = load_config(options.configs, names_of(behaviours));
     if (options.replay.empty()) check_streams(behaviours, config);
+    if (options.guarded) {
+      if (!options.no_rt) rt::lock_memory(static_cast<std::size_t>(config.heap_mib) << 20);  // judged when it arms
+      if (!wait_for_go()) return 0;
+    }
     Flight flight(behaviours, options, std::move(config));
     return flight.run(signals);
   } catch (const std::exception& e) {

@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <sys/prctl.h>
+#include <sys/resource.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -17,12 +18,14 @@
 namespace wasp::scheduling {
 namespace {
 
-constexpr int kLastInherited = kLineSocketDescriptor;
+constexpr int kLastInherited = kGoDescriptor;
 
-/// Puts the descriptors where a guarded flight looks for them. Above the targets first: they may be among them.
-bool inherit(const FlightChild::Descriptors& d) {
-  const std::array<int, 3> from{d.page, d.line, d.line_socket};
-  std::array<int, 3> safe{};
+constexpr int kHurriedNice = -15;
+
+/// Puts page, line, its socket and the word to go where a guarded flight looks for them. Above the targets first: they
+/// may be among them.
+bool inherit(const std::array<int, 4>& from) {
+  std::array<int, 4> safe{};
   for (std::size_t i = 0; i < from.size(); ++i) safe[i] = fcntl(from[i], F_DUPFD_CLOEXEC, kLastInherited + 1);
   bool ok = true;
   for (std::size_t i = 0; i < safe.size(); ++i)
@@ -32,8 +35,12 @@ bool inherit(const FlightChild::Descriptors& d) {
 
 }  // namespace
 
-FlightChild::FlightChild(const std::vector<std::string>& command, const Descriptors& descriptors,
-                         const cpu_set_t& cores) {
+FlightChild::FlightChild(const std::vector<std::string>& command, int page, int line, const cpu_set_t& cores,
+                         bool hurried)
+    : sockets_(drivers::make_handover()) {
+  int go[2];
+  if (pipe2(go, O_CLOEXEC) != 0) throw std::runtime_error(std::string("pipe: ") + std::strerror(errno));
+  go_fd_ = go[1];
   std::vector<char*> argv;
   for (const auto& word : command) argv.push_back(const_cast<char*>(word.c_str()));
   argv.push_back(nullptr);
@@ -47,9 +54,11 @@ FlightChild::FlightChild(const std::vector<std::string>& command, const Descript
     sigemptyset(&none);
     sigprocmask(SIG_SETMASK, &none, nullptr);
     sched_setaffinity(0, sizeof cores, &cores);
-    if (inherit(descriptors)) execv(argv[0], argv.data());
+    if (hurried) setpriority(PRIO_PROCESS, 0, kHurriedNice);
+    if (inherit({page, line, sockets_.taker, go[0]})) execv(argv[0], argv.data());
     _exit(127);
   }
+  close(go[0]);
   pid_fd_ = static_cast<int>(syscall(SYS_pidfd_open, pid_, 0));
   if (pid_fd_ >= 0) fcntl(pid_fd_, F_SETFD, FD_CLOEXEC);
 }
@@ -59,11 +68,26 @@ FlightChild::~FlightChild() {
     signal(SIGKILL);
     waitpid(pid_, nullptr, 0);
   }
-  if (pid_fd_ >= 0) close(pid_fd_);
+  for (const int fd : {pid_fd_, go_fd_, sockets_.giver, sockets_.taker})
+    if (fd >= 0) close(fd);
 }
+
+void FlightChild::go() noexcept {
+  if (go_fd_ < 0) return;
+  static_cast<void>(!write(go_fd_, "g", 1));
+  close(go_fd_);
+  go_fd_ = -1;
+}
+
+void FlightChild::give_line(int line) noexcept { drivers::give_descriptor(sockets_.giver, line); }
 
 void FlightChild::signal(int number) const noexcept {
   if (!end_) kill(pid_, number);  // not reaped yet, so the number is still its own
+}
+
+void FlightChild::kill_at_once() const noexcept {
+  if (!end_) setpriority(PRIO_PROCESS, static_cast<id_t>(pid_), kHurriedNice);
+  signal(SIGKILL);
 }
 
 const std::optional<ProcessEnd>& FlightChild::poll() noexcept {

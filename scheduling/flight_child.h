@@ -1,5 +1,6 @@
 // The flying process as its guardian holds it: started with the guard page and the serial line as inherited
-// descriptors, watched through a pidfd. It is told to land (SIGTERM) should the guardian die.
+// descriptors (guard_page.h), watched through a pidfd. It reads its configuration and waits until it is told to go. It
+// is told to land (SIGTERM) should the guardian die.
 #pragma once
 
 #include <sched.h>
@@ -8,6 +9,8 @@
 #include <optional>
 #include <string>
 #include <vector>
+
+#include "drivers/line_handover.h"
 
 namespace wasp::scheduling {
 
@@ -19,13 +22,10 @@ struct ProcessEnd {
 
 class FlightChild {
  public:
-  /// What a guarded flight finds as descriptors 3, 4 and 5 (guard_page.h).
-  struct Descriptors {
-    int page = -1, line = -1, line_socket = -1;
-  };
-
-  /// Starts `command[0]` on the cores of `cores`, without the guardian's priority. Throws std::runtime_error.
-  FlightChild(const std::vector<std::string>& command, const Descriptors& descriptors, const cpu_set_t& cores);
+  /// Starts `command[0]` on the cores of `cores`, without the guardian's priority. Throws std::runtime_error or
+  /// std::system_error.
+  /// `hurried`: ahead of ordinary processes, for an armed vehicle waits for it.
+  FlightChild(const std::vector<std::string>& command, int page, int line, const cpu_set_t& cores, bool hurried);
   ~FlightChild();  ///< kills it, if it still runs
   FlightChild(const FlightChild&) = delete;
   FlightChild& operator=(const FlightChild&) = delete;
@@ -33,12 +33,19 @@ class FlightChild {
   [[nodiscard]] pid_t pid() const noexcept { return pid_; }
   [[nodiscard]] int pid_fd() const noexcept { return pid_fd_; }  ///< readable once it has ended
   void signal(int number) const noexcept;
+  /// SIGKILL, and its end ahead of ordinary processes: its memory takes a while to be taken apart.
+  void kill_at_once() const noexcept;
+  /// It may begin.
+  void go() noexcept;
+  /// The line was opened again.
+  void give_line(int line) noexcept;
   /// Its end once it has come, without waiting.
   const std::optional<ProcessEnd>& poll() noexcept;
 
  private:
   pid_t pid_ = -1;
-  int pid_fd_ = -1;
+  int pid_fd_ = -1, go_fd_ = -1;
+  drivers::HandoverSockets sockets_;
   std::optional<ProcessEnd> end_;
 };
 

@@ -8,6 +8,7 @@
 #include "rt/clock.h"
 #include "scheduling/flow_ring.h"
 #include "shm/broadcast_ring.h"
+#include "shm/time_namespace.h"
 #include "shm/topics.h"
 #include "types/messages.h"
 #include "types/position_sample.h"
@@ -19,6 +20,18 @@ using shm::TopicKind;
 
 std::byte* block(const shm::Region& region, const char* topic, const char* type) {
   return region.at(region.topic(topic, type).offset);
+}
+
+/// Waiting does not help against it.
+struct ForeignClock : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+/// Every age is a difference of two processes' readings of CLOCK_MONOTONIC.
+shm::Region of_our_clock(shm::Region region) {
+  if (const std::string why = shm::foreign_clock(region.header().writer_pid.load()); !why.empty())
+    throw ForeignClock(region.name() + ": " + why);
+  return region;
 }
 
 }  // namespace
@@ -69,7 +82,9 @@ shm::Region attach_camera(const std::string& instance, double patience_s, const 
   const TimeNs deadline = rt::now() + from_seconds(patience_s);
   for (;;) {
     try {
-      return shm::Region::attach_with_bells(shm::camera_region(instance));
+      return of_our_clock(shm::Region::attach_with_bells(shm::camera_region(instance)));
+    } catch (const ForeignClock& e) {
+      throw std::runtime_error(std::string("no camera: ") + e.what());
     } catch (const std::exception& e) {
       if (cancelled() || rt::now() >= deadline) throw std::runtime_error(std::string("no camera: ") + e.what());
     }

@@ -29,6 +29,15 @@ GuardBlock* map(int fd) {
 
 }  // namespace
 
+bool wait_for_go(int fd) {
+  char word = 0;
+  ssize_t n = -1;
+  while ((n = read(fd, &word, 1)) < 0 && errno == EINTR) {
+  }
+  close(fd);
+  return n == 1;
+}
+
 GuardPage GuardPage::create() {
   const int fd = memfd_create("wasp-guard", MFD_CLOEXEC | MFD_ALLOW_SEALING);
   if (fd < 0) fail("memfd_create");

@@ -6,7 +6,11 @@
 namespace wasp::scheduling {
 
 /// Descriptors a guarded flight finds open: they have the same numbers always, as systemd's sockets have.
-enum GuardedDescriptor : int { kPageDescriptor = 3, kLineDescriptor = 4, kLineSocketDescriptor = 5 };
+enum GuardedDescriptor : int { kPageDescriptor = 3, kLineDescriptor = 4, kLineSocketDescriptor = 5, kGoDescriptor = 6 };
+
+/// In the flying process: waits for the guardian's word to begin. A successor is started while the one before it still
+/// may come back. False: never. Closes the descriptor.
+bool wait_for_go(int fd = kGoDescriptor);
 
 class GuardPage {
  public:

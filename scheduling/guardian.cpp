@@ -74,8 +74,24 @@ Guardian::Guardian(GuardPlan plan, std::vector<std::string> command, bool real_t
 
 Guardian::~Guardian() {
   flight_.reset();
-  for (const int fd : {signals_fd_, sockets_.giver, sockets_.taker})
-    if (fd >= 0) close(fd);
+  successor_.reset();
+  if (signals_fd_ >= 0) close(signals_fd_);
+}
+
+std::unique_ptr<FlightChild> Guardian::child() {
+  const bool hurried = state_.ours || state_.restarted;
+  return std::make_unique<FlightChild>(command_, page_.fd(), port_.fd(), cores_, hurried);
+}
+
+bool Guardian::may_restart() const { return static_cast<int>(page_.block().incarnation.load()) < plan_.guard.restarts; }
+
+/// Of a flight that hangs and may have to be killed.
+void Guardian::prepare_successor() {
+  try {
+    successor_ = child();
+  } catch (const std::exception& e) {  // tried again when it is needed
+    say(fmt::format("no successor is prepared: {}", e.what()));
+  }
 }
 
 void Guardian::start() {
@@ -83,13 +99,10 @@ void Guardian::start() {
   block.next_due_ns.store(0);
   block.commanding.store(0);
   block.beat_at_ns.store(0);
-  for (const int fd : {sockets_.giver, sockets_.taker})
-    if (fd >= 0) close(fd);
-  sockets_ = drivers::make_handover();
   killed_ = reported_end_ = false;
-  flight_.reset();
-  flight_ =
-      std::make_unique<FlightChild>(command_, FlightChild::Descriptors{page_.fd(), port_.fd(), sockets_.taker}, cores_);
+  if (successor_ && successor_->poll()) successor_.reset();
+  flight_ = successor_ ? std::move(successor_) : child();
+  flight_->go();
 }
 
 int Guardian::run() {
@@ -140,7 +153,8 @@ void Guardian::tend_line() {
   if (!line_gone_) return;
   if (!port_.try_reopen()) return;
   line_gone_ = false;
-  drivers::give_descriptor(sockets_.giver, port_.fd());
+  flight_->give_line(port_.fd());
+  if (successor_) successor_->give_line(port_.fd());
 }
 
 GuardSight Guardian::sight(TimeNs planned_ns) {
@@ -166,14 +180,16 @@ void Guardian::act(const GuardDeed& deed, TimeNs now_ns) {
   if (state_.ours && (deed.speak || deed.take)) speak(now_ns);
   if (deed.take)
     say(fmt::format("took the line: {} ms since the last beat", (now_ns - state_.beat_at_taking_ns) / kMillisecond));
+  if (deed.take && !flight_->poll() && may_restart()) prepare_successor();
   if (deed.give_back) {
+    successor_.reset();
     block.owner.store(static_cast<std::uint32_t>(LineOwner::kFlight));
     say(fmt::format("gave the line back after {} ms and {} neutral setpoints",
                     (now_ns - state_.taken_at_ns) / kMillisecond, spoken_));
   }
   if (deed.kill && !killed_) {
     killed_ = true;
-    flight_->signal(SIGKILL);
+    flight_->kill_at_once();
     say("the control thread does not beat: flight process killed");
   }
 }
@@ -214,10 +230,15 @@ bool Guardian::ended(const ProcessEnd& end) {
                         : fmt::format("flight process ended with code {} while it commanded", end.code));
   reported_end_ = true;
   const bool ran = block.beat_at_ns.load() != 0;
-  if (!crashed || !ran || static_cast<int>(block.incarnation.load()) >= plan_.guard.restarts) return false;
+  if (!crashed || !ran || !may_restart()) return false;
   block.incarnation.fetch_add(1);
   state_.restarted = true;
-  start();
+  try {
+    start();
+  } catch (const std::exception& e) {  // neutral goes on to its end
+    say(fmt::format("flight process cannot be started again: {}", e.what()));
+    return false;
+  }
   say(fmt::format("flight process started again (pid {}); it never commands", flight_->pid()));
   return true;
 }

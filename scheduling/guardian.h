@@ -1,13 +1,13 @@
 // The guardian: the tiny parent of the flying process. It opens the serial line, keeps it, and starts the flight with
 // it; it reads the beat of the control thread from one shared page, and when the flight dies, freezes or its control
 // thread stops beating it speaks in its place: neutral, or silence on purpose, as configured; then it starts the flight
-// again, which never commands any more. What is decided when: guard_policy.h.
+// again, which never commands any more. The successor of a flight that hangs is started at once and waits, its
+// configuration read, until that one has been killed or has come back. What is decided when: guard_policy.h.
 #pragma once
 
 #include <memory>
 
 #include "drivers/autopilot_link.h"
-#include "drivers/line_handover.h"
 #include "drivers/line_port.h"
 #include "scheduling/flight_child.h"
 #include "scheduling/guard_config.h"
@@ -28,7 +28,10 @@ class Guardian {
   int run();
 
  private:
+  std::unique_ptr<FlightChild> child();
+  void prepare_successor();
   void start();
+  [[nodiscard]] bool may_restart() const;
   void wait(TimeNs until_ns);
   void take_signals();
   void tend_line();
@@ -47,8 +50,7 @@ class Guardian {
   GuardPage page_;
   std::unique_ptr<drivers::LinkSigning> signing_;  ///< of a signed line
   drivers::AutopilotLink voice_;                   ///< encodes
-  drivers::HandoverSockets sockets_;
-  std::unique_ptr<FlightChild> flight_;
+  std::unique_ptr<FlightChild> flight_, successor_;
   GuardState state_;
   TimeNs heartbeat_due_ns_ = 0;
   bool line_gone_ = false, killed_ = false, reported_end_ = false;

@@ -27,6 +27,7 @@ class RoudiProcess {
   RoudiProcess& operator=(const RoudiProcess&) = delete;
 
   [[nodiscard]] const std::string& trouble() const { return trouble_; }
+  [[nodiscard]] pid_t pid() const { return pid_; }
   void signal(int number) const;
   /// SIGKILL, and another daemon in its place. False, with trouble(), if that one does not come up.
   bool replace();

@@ -22,7 +22,7 @@ TEST(FaultsProgram, ListsItsCatalogueAndRefusesBadArguments) {
   EXPECT_NE(list.find("hover"), std::string::npos);
   EXPECT_EQ(run_shell(kFaults + " --help").second, 0);
   EXPECT_EQ(run_shell(kFaults + " --phase nowhere 2>&1").second, 2);
-  EXPECT_EQ(run_shell(kFaults + " --class 18 2>&1").second, 2);
+  EXPECT_EQ(run_shell(kFaults + " --class 19 2>&1").second, 2);
 }
 
 TEST(FaultsProgram, HostileInputIsRefusedByName) {

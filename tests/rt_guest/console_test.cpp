@@ -84,6 +84,14 @@ TEST(Machine, AGuestThatEndsItsJobsIsHeard) {
   EXPECT_EQ(machine.boot().outcomes().at("a").exit_code, 0);
 }
 
+TEST(Machine, ARestartThatTheLastJobWaitedForIsItsEnd) {
+  StandIn machine(
+      "echo '@wasp up k'; echo '@wasp result dog 0 {}'; echo '@wasp last dog'; echo '@wasp alive dog 1980'; exit 0");
+  const auto figures = machine.boot().outcomes().at("dog").figures;
+  EXPECT_EQ(figures["restarted"], true);
+  EXPECT_EQ(figures["alive_ms"], 1980);
+}
+
 TEST(Machine, APanicIsReportedWithTheLastLines) {
   StandIn machine("echo '@wasp up k'; echo 'Kernel panic - not syncing: no init'; exit 0");
   const std::string said = failure_of(machine);

@@ -49,11 +49,23 @@ void Console::take(std::string_view line) {
     outcomes_[name].log.emplace_back(line);
   } else if (kind == "result") {
     take_result(line);
+  } else if (kind == "last") {
+    last_ = word(line);
+  } else if (kind == "alive") {  // so long after what should end the machine, virtual milliseconds
+    JobOutcome& outcome = outcomes_[std::string(word(line))];
+    if (outcome.figures.is_object()) outcome.figures["alive_ms"] = std::atoi(std::string(line).c_str());
   } else if (kind == "error") {
     errors_.emplace_back(line);
   } else if (kind == "end") {
     ended_ = true;
   }
+}
+
+void Console::machine_ended() {
+  if (last_.empty() || ended_) return;
+  JobOutcome& outcome = outcomes_[last_];
+  if (outcome.figures.is_object()) outcome.figures["restarted"] = true;
+  ended_ = true;
 }
 
 void Console::take_result(std::string_view rest) {

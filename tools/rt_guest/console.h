@@ -24,7 +24,9 @@ class Console {
   void feed(std::string_view bytes);
 
   [[nodiscard]] bool up() const { return !kernel_.empty(); }
-  [[nodiscard]] bool ended() const { return ended_; }                    ///< the guest has done all its jobs
+  [[nodiscard]] bool ended() const { return ended_; }  ///< the guest has done all its jobs
+  /// The emulator has ended. What the last job waited for, if it said so ("last NAME").
+  void machine_ended();
   [[nodiscard]] const std::string& kernel() const { return kernel_; }    ///< "6.1.0-rt-arm64 realtime=1"
   [[nodiscard]] const std::string& running() const { return running_; }  ///< name of the job under way
   [[nodiscard]] int elapsed_s() const { return elapsed_s_; }             ///< of it, virtual
@@ -37,7 +39,7 @@ class Console {
   void take(std::string_view line);
   void take_result(std::string_view rest);
 
-  std::string partial_, kernel_, running_;
+  std::string partial_, kernel_, running_, last_;
   std::map<std::string, JobOutcome> outcomes_;
   std::vector<std::string> errors_;
   std::deque<std::string> tail_;

@@ -1,5 +1,5 @@
 # What the guest can be asked to do; sourced by init.sh. A line of /wasp/jobs is: flight NAME SECONDS rt|other idle|stress
-# or: rights NAME, or: faults NAME REGEX.
+# or: rights NAME, or: faults NAME REGEX [OPTIONS], or: watchdog NAME MODULE.
 
 say() { echo "@wasp $*"; }
 
@@ -10,6 +10,7 @@ run_job() {
     flight) flight "$@" ;;
     rights) rights "$@" ;;
     faults) faults "$@" ;;
+    watchdog) watchdog "$@" ;;
     *) say "error no job '$kind'" ;;
   esac
 }
@@ -29,6 +30,11 @@ start_stress() {
   stress-ng --temp-path /tmp --cpu 4 --vm 2 --vm-bytes 16m --hdd 1 --hdd-bytes 4m --io 1 --switch 4 --timer 1 --quiet \
     >/tmp/stress.log 2>&1 &
   stress=$!
+}
+
+# load_module NAME: with what it depends on.
+load_module() {
+  while read -r file; do insmod "/wasp/modules/$file"; done <"/wasp/modules/$1.list"
 }
 
 # wait_until COMMAND...: half a minute of virtual time at most.
@@ -75,15 +81,55 @@ rights() {
 # Faults done for real, their answers measured on the wire; nobody else needs this machine's clock.
 faults() {
   name=$1 only=$2
+  shift 2
   say "start $name"
   cd /tmp
   {
-    wasp-faults --replay /wasp/clip --own-machine --only "$only" --out "/tmp/$name" --json "$name.json" 2>&1
+    wasp-faults --replay /wasp/clip --own-machine --only "$only" "$@" --out "/tmp/$name" --json "$name.json" 2>&1
     echo $? >"$name.code"
   } | while IFS= read -r line; do say "log $name $line"; done
   for log in "$name"/*/flight.txt; do sed "s/^/@wasp log $name /" "$log"; done
   say "result $name $(cat "$name.code") $(tr -d '\n' <"$name.json")"
   rm -rf /dev/shm/* "$name" "$name".*
+}
+
+# The board's own watchdog: fed in flight, disarmed by an orderly end; then the guardian is killed, and the board must
+# start again. Nothing comes after this job: the emulator ends where a board would boot.
+watchdog() {
+  name=$1 state=/sys/class/watchdog/watchdog0/state
+  say "start $name"
+  cd /tmp
+  load_module "$2"
+  start_vehicle
+  printf '[guardian]\nwatchdog = "/dev/watchdog"\n' >"$name.dog.toml"
+  fly="wasp guard $options --config $name.dog.toml --replay /wasp/clip --preload"
+  $fly --seconds 8 >"$name.log" 2>&1 &
+  guard=$!
+  wait_until grep -qs "mission:" "$name.log"
+  fed=0
+  for second in 1 2 3 4 5; do # the device would have bitten after two
+    sleep 1
+    [ "$(cat $state)" = active ] && fed=$((fed + 1))
+  done
+  limit=$(cat /sys/class/watchdog/watchdog0/timeout)
+  wait $guard
+  code=$?
+  after=$(cat $state)
+  sleep 5
+  sed "s/^/@wasp log $name /" "$name.log"
+  say "result $name 0 {\"flight\":$code,\"limit_s\":$limit,\"active_s\":$fed,\"after\":\"$after\",\"outlived_s\":5}"
+  $fly --seconds 60 >"$name.log" 2>&1 &
+  guard=$!
+  wait_until grep -qs "mission:" "$name.log"
+  sleep 3
+  say "last $name"
+  kill -9 $guard
+  alive=0
+  while [ $alive -lt 10000 ]; do
+    usleep 20000
+    alive=$((alive + 20))
+    say "alive $name $alive"
+  done
 }
 
 flight() {

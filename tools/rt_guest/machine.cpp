@@ -50,7 +50,10 @@ std::vector<std::string> machine_arguments(const std::string& arch, const Image&
   std::string words =
       arm ? find_program("qemu-system-aarch64", "qemu-system-arm") + " -machine virt,gic-version=3 -cpu cortex-a72"
           : find_program("qemu-system-x86_64", "qemu-system-x86") + " -machine q35 -cpu max";
-  words += " -smp 1 -accel tcg,thread=single,tb-size=256 -icount shift=1,sleep=off -m 1024";
+  words += image.cores == 1 ? " -smp 1 -accel tcg,thread=single,tb-size=256 -icount shift=1,sleep=off"
+                            : fmt::format(" -smp {} -accel tcg,thread=multi,tb-size=256", image.cores);
+  words += " -m 1024";
+  if (!arm) words += " -device i6300esb";  // a hardware watchdog; it resets, and a reset is the emulator's end
   words += " -nodefaults -no-reboot -display none -monitor none -serial stdio";
   std::vector<std::string> arguments = split(words);
   const std::string console = arm ? "console=ttyAMA0,115200 " : "console=ttyS0,115200 tsc=reliable no_timer_check ";
@@ -69,7 +72,10 @@ Console boot(const std::string& arch, const Image& image, const fs::path& consol
   for (;;) {
     const bool over = machine.poll().has_value();
     if (follow(file, console)) heard_ns = rt::now();
-    if (over) break;
+    if (over) {
+      console.machine_ended();
+      break;
+    }
     look(console);
     if (console.ended()) {  // nothing left but to power off
       machine.end(SIGTERM, 20.0);

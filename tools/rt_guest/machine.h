@@ -1,6 +1,6 @@
 // The emulated machine, on virtual time: one processor at 500 million instructions a second, time standing still
-// whenever the emulator does, so that latencies do not depend on the host. (Two processors show false latencies of
-// milliseconds on arm64, and hang on amd64.)
+// whenever the emulator does, so that latencies do not depend on the host. Several processors share the host's time,
+// and nothing they say of latencies means anything: for what needs a second one.
 #pragma once
 
 #include <filesystem>

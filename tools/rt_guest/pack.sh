@@ -45,6 +45,7 @@ add_program "$root/usr/bin/busybox" "$stage/bin/busybox"
 add_program "$root/usr/bin/stress-ng" "$stage/bin/stress-ng"
 for program in wasp wasp-guard wasp-sim wasp-top wasp-faults; do add_program "$build/$program" "$stage/wasp/bin/$program"; done
 cp -r "$clip" "$stage/wasp/clip"
+cp -r "$(dirname "$root")/modules" "$stage/wasp/modules"
 cp "$config"/*.toml "$stage/wasp/config/"
 cp "$jobs" "$stage/wasp/jobs"
 install -m 755 "$here/init.sh" "$stage/init"

@@ -126,7 +126,7 @@ Image prepare(const Plan& plan, const fs::path& work) {
            work / "pack.txt");
   std::string version;
   std::getline(std::ifstream(cache / "version") >> std::ws, version);
-  return {cache / "vmlinuz", initrd, version};
+  return {cache / "vmlinuz", initrd, version, plan.cores};
 }
 
 }  // namespace wasp::tools::rt_guest

@@ -18,6 +18,7 @@ struct Unavailable : std::runtime_error {
 struct Image {
   std::filesystem::path kernel, initrd;
   std::string kernel_package;
+  int cores = 1;
 };
 
 /// `work` is a folder of this run's own. Says each step on standard error. Throws Unavailable, or std::runtime_error

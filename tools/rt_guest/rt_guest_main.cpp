@@ -25,12 +25,14 @@ constexpr int kUnavailable = 77;  // CTest: skipped
 
 struct Options {
   std::string arch = "arm64", json;
-  bool full = false, short_form = false, stress = false;
+  bool full = false, short_form = false, stress = false, faults = false, two_cores = false;
   std::int64_t cycles = 0, stress_cycles = 0;
   double patience_s = 600;
 };
 
 Plan plan_of(const Options& o) {
+  if (o.faults) return plan_faults(o.arch);
+  if (o.two_cores) return plan_two_cores(o.arch);
   Cycles cycles;
   if (o.full) cycles = {.quiet = 36'000, .stressed = 2'400, .not_real_time = 200};
   if (o.cycles > 0) cycles.quiet = o.cycles;
@@ -55,7 +57,8 @@ void print_logs(const Console& console) {
 bool print(const Plan& plan, const Console& console, const std::vector<Result>& results) {
   const bool ok = std::all_of(results.begin(), results.end(), [](const Result& r) { return r.ok; });
   std::cout << plan.arch << ", kernel " << console.kernel()
-            << ", virtual time: 1 processor, 500 million instructions a second\n"
+            << (plan.cores == 1 ? ", virtual time: 1 processor, 500 million instructions a second\n"
+                                : ", 2 processors, no virtual time: no time is judged\n")
             << table(read_rows(plan, console.outcomes())) << "\n";
   print_results(results);
   if (!ok) print_logs(console);
@@ -101,6 +104,11 @@ std::optional<int> parse(int argc, char** argv, Options& o) {
   app.add_option("--stress-cycles", o.stress_cycles, "control cycles under stress-ng (0: as the form says)")
       ->check(CLI::Range(0, 10'000'000));
   app.add_flag("--stress", o.stress, "as many cycles under stress-ng as in the quiet flight");
+  app.add_flag("--faults", o.faults,
+               "instead: every kind of fault that a flight on replayed frames can show, on virtual time")
+      ->excludes(full);
+  app.add_flag("--two-cores", o.two_cores, "instead: a core is taken away in flight; its times mean nothing")
+      ->excludes(full);
   app.add_option("--json", o.json, "write all figures to this file");
   app.add_option("--patience", o.patience_s, "seconds of silence after which the guest counts as dead")
       ->check(CLI::Range(10.0, 86400.0));

@@ -106,6 +106,24 @@ void judge_faults(const Job& job, const nlohmann::json& f, std::vector<Result>& 
   out.push_back(at_least(job.name + ": faults done", tried, job.fault_count));
 }
 
+/// Fed through a flight that outlasts its limit, quiet after an orderly end, and biting once nobody feeds it.
+void judge_watchdog(const Job& job, const Bars& bars, const nlohmann::json& f, std::vector<Result>& out) {
+  const auto number = [&](const char* key) {
+    return f.is_object() && f.contains(key) && f[key].is_number_integer() ? f[key].get<std::int64_t>() : -1;
+  };
+  const bool there = f.is_object();
+  out.push_back(exactly(job.name + ": its limit [s]", number("limit_s"), 2));
+  out.push_back(at_least(job.name + ": seconds fed in flight", number("active_s"), 4));
+  out.push_back(yes(job.name + ": the flight ended in order", number("flight") == 0 || number("flight") == 1));
+  out.push_back(yes(job.name + ": disarmed by an orderly end", there && f.value("after", "") == "inactive"));
+  out.push_back(at_least(job.name + ": outlived that end [s]", number("outlived_s"), 5));
+  out.push_back(
+      yes(job.name + ": restarts the board once its guardian is killed", there && f.value("restarted", false)));
+  Result within = at_most(job.name + ": within", static_cast<double>(number("alive_ms")), "ms", bars.restart_ms);
+  within.ok = within.ok && number("alive_ms") > 0;
+  out.push_back(std::move(within));
+}
+
 }  // namespace
 
 std::vector<Row> read_rows(const Plan& plan, const std::map<std::string, JobOutcome>& outcomes) {
@@ -125,9 +143,11 @@ std::vector<Result> judge(const Plan& plan, const std::map<std::string, JobOutco
     const auto it = outcomes.find(job.name);
     judge_rights(job.name, it == outcomes.end() ? nlohmann::json() : it->second.figures, results);
   }
-  for (const Job& job : plan.jobs)
-    if (job.kind == JobKind::kFaults)
-      judge_faults(job, outcomes.contains(job.name) ? outcomes.at(job.name).figures : nlohmann::json(), results);
+  for (const Job& job : plan.jobs) {
+    const auto figures = outcomes.contains(job.name) ? outcomes.at(job.name).figures : nlohmann::json();
+    if (job.kind == JobKind::kFaults) judge_faults(job, figures, results);
+    if (job.kind == JobKind::kWatchdog) judge_watchdog(job, plan.bars, figures, results);
+  }
   for (const Row& row : read_rows(plan, outcomes)) {
     results.push_back(yes(row.job.name + ": figures handed back", row.present));
     if (row.present) judge_flight(plan.bars, row, outcomes.at(row.job.name), results);
