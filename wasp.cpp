@@ -31,6 +31,7 @@ constexpr const char* kUsage =
     "  plan     can the thread table keep its deadlines? response times, before any flight\n"
     "  sim      the simulator: camera and autopilot as another process\n"
     "  world    make and look at simulated worlds, VRML97 files\n"
+    "  camera   a real camera (V4L2, IIDC, Kinect) into shared memory; --list shows what is plugged in\n"
     "  top      live rates, ages and latencies of a running flight, read-only\n"
     "  record   log a running flight, read-only\n"
     "  report   make report.html of a logged flight\n"

@@ -31,7 +31,8 @@ struct Plan {
   std::vector<std::string> reasons;  ///< why not, one line a thread
 };
 
-/// Enabled behaviours only. `frame_period_ns` is the front camera's; `with_camera` adds a camera thread of this process: replay or relay.
+/// Enabled behaviours only. `frame_period_ns` is the front camera's; `with_camera` adds a camera thread: replay,
+/// relay, or that of `wasp camera`.
 /// Cores are those this process may really use.
 Plan make_plan(const Config& config, DurationNs frame_period_ns, bool with_camera, const MeasuredCosts& measured);
 

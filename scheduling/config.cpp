@@ -67,8 +67,20 @@ void read_geometry(TomlTable& t, CameraGeometry& camera, double& pitch_down_deg)
   read_vector(t, "position_body_m", {camera.position_body_m.data(), 3}, -10, 10);
 }
 
+/// What only real cameras have.
+void read_camera_settings(TomlTable& t, drivers::CameraSettings& s) {
+  t.text_value("device", s.device);
+  t.text_value("pixel_format", s.pixel_format);
+  t.number("exposure_us", s.exposure_us, 0, 1e6);
+  t.number("gain", s.gain, -1, 1e6);
+  t.text_value("trigger", s.trigger, {"off", "external"});
+  t.number("buffers", s.buffers, 2, 32);
+  t.number("readout_us", s.readout_us, -1, 1e6);
+}
+
 void read_camera(TomlTable t, Config& c) {
-  t.text_value("driver", c.camera_driver, {"sim", "replay"});
+  t.text_value("driver", c.camera_driver, {"sim", "replay", "v4l2", "dc1394", "kinect"});
+  read_camera_settings(t, c.camera_settings);
   t.number("rate_hz", c.camera_rate_hz, 1, 1000);
   t.number("stuck_frames", c.stuck_frames, 0, 1000);
   read_geometry(t, c.camera, c.camera_pitch_down_deg);
@@ -77,6 +89,8 @@ void read_camera(TomlTable t, Config& c) {
 
 void read_camera_down(TomlTable t, DownCameraConfig& c) {
   t.flag("enabled", c.enabled);
+  t.text_value("driver", c.driver, {"sim", "v4l2", "dc1394", "kinect"});
+  read_camera_settings(t, c.settings);
   t.number("rate_hz", c.rate_hz, 1, 1000);
   read_geometry(t, c.geometry, c.pitch_down_deg);
   t.finish();
@@ -240,6 +254,8 @@ void read_document(TomlTable root, Config& c, bool foreign_behaviours) {
 }
 
 }  // namespace
+
+bool is_device(const std::string& camera_driver) { return camera_driver != "sim" && camera_driver != "replay"; }
 
 Config load_config(const std::vector<std::string>& paths, const std::vector<std::string>& behaviour_names) {
   Config config;

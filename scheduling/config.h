@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "control/control_step.h"
+#include "drivers/camera_driver.h"
 #include "rt/periodic.h"
 #include "rt/thread.h"
 #include "scheduling/autopilot_config.h"
@@ -29,6 +30,8 @@ struct ThreadRow {
 /// The second camera, which looks down.
 struct DownCameraConfig {
   bool enabled = false;  ///< false: behaviours that look down cannot be enabled
+  std::string driver = "sim";
+  drivers::CameraSettings settings;  ///< of a real camera
   double rate_hz = 30.0;
   double pitch_down_deg = 90.0;
   CameraGeometry geometry;
@@ -55,6 +58,7 @@ struct Config {
   AutopilotConfig autopilot;
 
   std::string camera_driver = "sim";
+  drivers::CameraSettings camera_settings;  ///< of a real camera
   CameraGeometry camera;
   double camera_pitch_down_deg = 30.0;
   double camera_rate_hz = 30.0;  ///< what admission takes as the period of the behaviours
@@ -76,6 +80,9 @@ struct Config {
   std::vector<ThreadRow> behaviours;        ///< index = Cue::behaviour
   std::vector<TomlTable> behaviour_params;  ///< [behaviour.NAME.params], checked by the behaviour's own list
 };
+
+/// True for a [camera] driver that is a device: `wasp camera` reads it.
+bool is_device(const std::string& camera_driver);
 
 /// The defaults, which are config/wasp.toml itself (built in), then `paths` in order; later ones override single keys.
 /// `behaviour_names` are the behaviours this program has, in order; a section for any other is an error, and one

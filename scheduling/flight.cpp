@@ -108,8 +108,8 @@ class Flight {
     open_camera();
     arm_faults();
     wire();
-    admit(make_plan(config_, frame_period_ns_, replay_ != nullptr || relay_ != nullptr, measured_costs()),
-          config_.admission, real_time_, log);
+    const bool camera_thread = replay_ || relay_ || is_device(config_.camera_driver);
+    admit(make_plan(config_, frame_period_ns_, camera_thread, measured_costs()), config_.admission, real_time_, log);
     latency_hold_ = prepare_real_time(config_, real_time_, log);
     start_threads();
     control_.realtime_started = true;
@@ -186,7 +186,7 @@ class Flight {
       const BehaviourRow& row = table_[i];
       if (config_.behaviours[i].enabled && !is_flow(row.stream) && !camera_->has(ring_of(row.stream)))
         throw std::runtime_error("behaviour '" + row.name + "' is enabled, but the camera offers no '" +
-                                 ring_of(row.stream) + "'");
+                                 ring_of(row.stream) + "': set [behaviour." + row.name + "] enabled = false");
     }
   }
 

@@ -76,7 +76,8 @@ int plan_main(const BehaviourTable& behaviours, int argc, char** argv) {
     Config config = load_config(configs, names_of(behaviours));
     if (replay) disable_without_stream(behaviours, {shm::kGray, shm::kDepth}, config);
     check_streams(behaviours, config);
-    const Plan plan = make_plan(config, from_seconds(1.0 / config.camera_rate_hz), replay,
+    const Plan plan = make_plan(config, from_seconds(1.0 / config.camera_rate_hz),
+                                replay || is_device(config.camera_driver),
                                 measured.empty() ? MeasuredCosts{} : read_measured_costs(measured));
     std::fputs((json ? plan_json(plan) + "\n" : plan_text(plan)).c_str(), stdout);
     return plan.schedulable ? 0 : 1;

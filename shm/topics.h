@@ -1,7 +1,8 @@
 // Names of the regions and topics: the one list that writers and readers share.
 //
-//   wasp.<instance>.camera   gray, depth, gray.down      written by whoever is the camera (simulator, replay, driver
-//                                                        process); the last one only where a camera looks down
+//   wasp.<instance>.camera   gray, depth, gray.down,     written by whoever is the camera (simulator, replay, wasp
+//                            camera, camera.down         camera); *.down only where a camera looks down, the blocks
+//                                                        camera* only from wasp camera
 //   wasp.<instance>.relay    as .camera                  written by a flight process with fault points only: what its
 //                                                        behaviours see instead (scheduling/camera_relay.h)
 //   wasp.<instance>.flight   imu, attitude, flow, flow.down, cue.<behaviour>, command, stages, run
@@ -23,6 +24,8 @@ inline std::string truth_region(const std::string& instance) { return "wasp." + 
 inline constexpr const char* kGray = "gray";           ///< type Frame: FrameHeader, then pixels at kFramePixelOffset
 inline constexpr const char* kDepth = "depth";         ///< type Frame; before the grey frame of the same exposure
 inline constexpr const char* kGrayDown = "gray.down";  ///< type Frame: the camera that looks down
+inline constexpr const char* kCamera = "camera";       ///< block, type CameraStatus (drivers/camera_status.h)
+inline constexpr const char* kCameraDown = "camera.down";  ///< likewise
 inline constexpr const char* kFlow = "flow";           ///< type Flow: FlowMessage first (scheduling/flow_ring.h)
 inline constexpr const char* kFlowDown = "flow.down";  ///< type Flow: of the camera that looks down
 inline constexpr const char* kImu = "imu";             ///< type Imu: ImuSample

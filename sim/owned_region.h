@@ -1,8 +1,9 @@
-// A shared memory region that vanishes with the simulator.
+// A shared memory region that vanishes with its process.
 #pragma once
 
 #include <span>
 #include <string>
+#include <string_view>
 
 #include "shm/region.h"
 
@@ -11,8 +12,8 @@ namespace wasp::sim {
 struct OwnedRegion {
   shm::Region region;
   /// Throws std::runtime_error as Region::create does.
-  OwnedRegion(const std::string& name, std::span<const shm::TopicSpec> topics)
-      : region(shm::Region::create(name, topics, "simulated")) {}
+  OwnedRegion(const std::string& name, std::span<const shm::TopicSpec> topics, std::string_view note = "simulated")
+      : region(shm::Region::create(name, topics, note)) {}
   ~OwnedRegion() { shm::Region::remove(region.name()); }
   OwnedRegion(const OwnedRegion&) = delete;
   OwnedRegion& operator=(const OwnedRegion&) = delete;

@@ -21,10 +21,14 @@ std::vector<std::string> behaviour_names(const std::vector<std::string>& files) 
 
 }  // namespace
 
-scheduling::Config read_flight_config(const std::string& extra) {
+scheduling::Config read_flight_config(const std::vector<std::string>& extra) {
   std::vector<std::string> files{(config_folder() / "wasp.toml").string()};
-  if (!extra.empty()) files.push_back(extra);
+  files.insert(files.end(), extra.begin(), extra.end());
   return scheduling::load_config(files, behaviour_names(files));
+}
+
+scheduling::Config read_flight_config(const std::string& extra) {
+  return read_flight_config(extra.empty() ? std::vector<std::string>{} : std::vector{extra});
 }
 
 }  // namespace wasp::tools
