@@ -149,6 +149,7 @@ class ScriptedCamera {
       wake();
     } else if (step.what == "silence") {
       changed.wait_for(lock, std::chrono::milliseconds(step.number), [this] { return !streaming_; });
+      if (!streaming_) ++position_;  // whoever lost patience finds it speaking again
     } else if (step.what == "unplug") {
       back_at_ = Clock::now() + std::chrono::milliseconds(step.number);
       ++position_;
