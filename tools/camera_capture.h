@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "drivers/camera_driver.h"
+#include "rt/clock.h"
 #include "scheduling/events.h"
 #include "tools/camera_rings.h"
 
@@ -21,6 +22,8 @@ class CameraCapture {
 
   /// Opens the device for the first time, refuses one that is not as promised, starts it. Throws CameraError.
   drivers::CameraFormat open();
+  /// After a failed open(): run() looks for the device.
+  void wait_for_it() { lost_at_ns_ = rt::now(); }
   /// What only this kind of camera counts; after run().
   [[nodiscard]] const std::string& account() const { return account_; }
   /// Runs until `stop`. Call from one thread, after open().

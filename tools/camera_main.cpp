@@ -65,8 +65,17 @@ struct Eye {
         rings(region, plan.topics, plan.request.width_px, plan.request.height_px),
         capture(plan.name, *plan.row, plan.request, rings, events) {}
 
-  void open(bool real_time) {
-    rings.status().real_time = real_time ? 1 : 0;
+  void open(const CameraOptions& options) {
+    rings.status().real_time = options.no_rt ? 0 : 1;
+    try {
+      open();
+    } catch (const drivers::CameraError& error) {
+      if (!options.wait) throw;
+      log(fmt::format("{}; waiting for it", error.what()));
+      capture.wait_for_it();
+    }
+  }
+  void open() {
     const drivers::CameraFormat f = capture.open();
     log(fmt::format("{}: {} at {}, {} x {} {}, {}", topic, f.identity, f.node, f.width_px, f.height_px, f.pixels,
                     f.settings));
@@ -91,7 +100,7 @@ class CameraProcess {
 
   void run(const sigset_t& signals) {
     for (const auto& plan : plans_) eyes_.push_back(std::make_unique<Eye>(plan, region_.region));
-    for (auto& eye : eyes_) eye->open(!options_.no_rt);
+    for (auto& eye : eyes_) eye->open(options_);
     latency_hold_ = options_.no_rt ? nullptr : scheduling::prepare_real_time(config_, true, log);
     for (auto& eye : eyes_) start(*eye);
     supervise(signals);

@@ -30,6 +30,7 @@ std::optional<int> parse_camera_options(int argc, char** argv, CameraOptions& o)
   app.add_option("--seconds", o.seconds, "end after this time; 0: run until SIGINT or SIGTERM")
       ->check(CLI::NonNegativeNumber);
   app.add_flag("--json", o.json, "--list and the figures at the end as one JSON object");
+  app.add_flag("--wait", o.wait, "a camera that is not there yet is waited for, as after a loss, instead of refused");
   app.add_flag("--no-rt", o.no_rt, "do not ask for SCHED_FIFO and locked memory");
   try {
     app.parse(argc, argv);

@@ -17,6 +17,7 @@ struct CameraOptions {
   std::optional<int> width_px, height_px;
   std::optional<double> rate_hz, exposure_us, gain;
   bool list = false, stats = false, json = false, no_rt = false;
+  bool wait = false;           ///< for a camera that is not there at the start
   std::filesystem::path save;  ///< empty: no pictures
   int frames = 5;
   double seconds = 0;  ///< 0: until a signal

@@ -1,4 +1,4 @@
-// `wasp fly`: starts the simulator, the recorder and the flight process, shows progress, judges the flight from its
+// `wasp fly`: starts the simulator or the real camera, the recorder and the flight process, shows progress, judges the flight from its
 // logs and writes the report. It maps the flight's memory read-only and never speaks to the autopilot.
 #include <fmt/format.h>
 #include <signal.h>
@@ -14,6 +14,7 @@
 #include "tools/fly_monitor.h"
 #include "tools/fly_run.h"
 #include "tools/fly_verdict.h"
+#include "tools/fly_world.h"
 
 namespace wasp::tools {
 namespace {
@@ -25,21 +26,8 @@ void on_interrupt(int) { interrupts.fetch_add(1); }
 
 constexpr double kOverhead_s = 8.0;  // arming, landing, start-up: for the progress bar only
 
-/// Waits, with generous patience, until the simulator's serial line is there.
-void wait_for_line(const Run& run, ChildProcess& sim) {
-  if (run.options.udp_port > 0) return;  // the simulator speaks first, whoever was there first
-  const TimeNs deadline = rt::now() + 60 * kSecond;
-  while (!fs::exists(run.folder / "tty")) {
-    if (const auto code = sim.poll())
-      throw std::runtime_error(fmt::format("the simulator ended with code {} at start; see {}", *code,
-                                           (run.folder / "log/sim.txt").string()));
-    if (rt::now() > deadline || interrupts > 1) throw std::runtime_error("the simulator did not come up");
-    rt::sleep_until(rt::now() + 10 * kMillisecond);
-  }
-}
-
 /// Shows progress until the flight process has ended; passes interrupts on. Returns its exit code.
-int watch(const Run& run, ChildProcess& flight, ChildProcess& sim) {
+int watch(const Run& run, ChildProcess& flight, FlyWorld& world) {
   FlyMonitor monitor(run.instance);
   const bool terminal = isatty(STDOUT_FILENO) != 0 && !run.options.json;
   const TimeNs start = rt::now();
@@ -52,8 +40,7 @@ int watch(const Run& run, ChildProcess& flight, ChildProcess& sim) {
                                    : "\nstopping at once\n");
       flight.signal(passed_on <= 2 ? SIGINT : SIGQUIT);  // the second stops it by its own way, the third kills it
     }
-    if (const auto code = sim.poll()) {
-      std::cerr << fmt::format("\nthe simulator ended with code {}\n", *code);
+    if (!world.look_after()) {
       flight.end(SIGINT, 5.0);
       break;
     }
@@ -73,15 +60,15 @@ int watch(const Run& run, ChildProcess& flight, ChildProcess& sim) {
 }
 
 void fly_processes(Run& run, int& flight_code) {
-  ChildProcess sim(sim_arguments(run), (run.folder / "log/sim.txt").string());
-  wait_for_line(run, sim);
+  FlyWorld world(run);
+  world.wait_until_there([] { return interrupts > 1; });
   ChildProcess recorder(recorder_arguments(run), (run.folder / "log/recorder.txt").string());
   {
     ChildProcess flight(flight_arguments(run), (run.folder / "log/flight.txt").string());
-    flight_code = watch(run, flight, sim);
+    flight_code = watch(run, flight, world);
   }
   recorder.end(SIGTERM, 60.0);
-  sim.end(SIGTERM, 10.0);
+  world.end();
   for (const auto& region : {shm::flight_region(run.instance), shm::camera_region(run.instance),
                              shm::relay_region(run.instance), shm::truth_region(run.instance)})
     shm::Region::remove(region);

@@ -36,8 +36,8 @@ std::string known_mission(const std::string& name) {
 
 std::optional<int> parse_fly_options(int argc, char** argv, FlyOptions& o) {
   CLI::App app{
-      "Flies a mission with the real-time flight process: in the simulator (default), or on a recording with\n"
-      "--replay. Writes OUT/NAME/ with log/ and report.html. Exit code 0 only if the mission was flown to its\n"
+      "Flies a mission with the real-time flight process: in the simulator (default), on a recording with\n"
+      "--replay, or with the real camera and autopilot that --config names ([camera] driver = v4l2 | dc1394 | kinect). Writes OUT/NAME/ with log/ and report.html. Exit code 0 only if the mission was flown to its\n"
       "end, behaviours commanded it, and every bar was met; 4: nothing failed, but it was stopped early or no "
       "behaviour\n"
       "ever commanded; 2: bad arguments; 1: anything else."};

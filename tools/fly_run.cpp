@@ -16,6 +16,7 @@
 #include "sim/sim_config.h"
 #include "tools/camera_section.h"
 #include "tools/child_process.h"
+#include "tools/flight_config.h"
 #include "tools/mission_files.h"
 #include "tools/program_paths.h"
 
@@ -58,6 +59,15 @@ Legs planned_legs(const Run& run) {
   return legs;
 }
 
+/// [camera] driver, the last file that says it. A replay needs none.
+std::string configured_camera(const Run& run) {
+  std::string driver = "sim";
+  if (!run.options.replay.empty()) return driver;
+  for (const auto& file : configuration_files(run))
+    scheduling::TomlTable::parse_file(file).table("camera").text_value("driver", driver);
+  return driver;
+}
+
 /// What the simulator shows, told to the flight process: cameras are said once, in the mission's sim.toml.
 std::string camera_sections(const sim::SimConfig& sim) {
   return fmt::format("[camera]\nrate_hz = {}\n{}", sim.camera_rate_hz, camera_keys(sim.camera)) +
@@ -70,17 +80,19 @@ void write_override(Run& run, const sim::SimConfig& sim) {
   std::string text = "# written by wasp fly for this run\n[run]\n";
   text += fmt::format("enforce_real_time = {}\nstrict_syscalls = {}\n", run.real_time, run.options.strict_syscalls);
   text += fmt::format("incident_dir = \"{}\"\n", fs::absolute(run.folder / "incidents").string());
-  const std::string line = run.options.udp_port > 0
-                               ? fmt::format("udp://127.0.0.1:{}", run.options.udp_port)
-                               : fmt::format("serial:{}:921600", fs::absolute(run.folder / "tty").string());
-  text += fmt::format("[autopilot]\nendpoint = \"{}\"\n", line);
-  if (!run.options.autopilot.empty()) text += fmt::format("flavour = \"{}\"\n", run.options.autopilot);
+  if (!on_hardware(run)) {
+    const std::string line = run.options.udp_port > 0
+                                 ? fmt::format("udp://127.0.0.1:{}", run.options.udp_port)
+                                 : fmt::format("serial:{}:921600", fs::absolute(run.folder / "tty").string());
+    text += fmt::format("[autopilot]\nendpoint = \"{}\"\n", line);
+    if (!run.options.autopilot.empty()) text += fmt::format("flavour = \"{}\"\n", run.options.autopilot);
+  }
   if (run.options.replay.empty()) {
     const Legs legs = planned_legs(run);
     run.flight_seconds = std::accumulate(legs.seconds.begin(), legs.seconds.end(), 0.0);
     text += fmt::format("[mission]\nheights_m = [{}]\nseconds = [{:.3f}]\n", fmt::join(legs.heights_m, ", "),
                         fmt::join(legs.seconds, ", "));
-    text += camera_sections(sim);
+    if (!on_hardware(run)) text += camera_sections(sim);
   } else {
     text += "[camera]\ndriver = \"replay\"\n";
   }
@@ -121,6 +133,10 @@ Run plan_run(FlyOptions options) {
   run.folder = run.options.out / run.options.name;
   run.mission = mission_folder(run.options.mission);
   run.instance = run.options.name;
+  run.camera_driver = configured_camera(run);
+  if (on_hardware(run) && !run.options.world.empty())
+    throw std::runtime_error("--world is the simulator's, but [camera] driver = \"" + run.camera_driver +
+                             "\" is a real camera");
   if (fs::exists(run.folder / "run.json") || fs::exists(run.folder / "log/imu.csv"))
     throw std::runtime_error(run.folder.string() +
                              " holds an earlier run; choose another --name (nothing is overwritten)");
@@ -138,7 +154,8 @@ std::filesystem::path fault_socket(const Run& run) { return run.folder / "faults
 void write_configuration(Run& run) {
   const auto sim = sim::load_sim_config((run.mission / "sim.toml").string());
   write_override(run, sim);
-  write_text(run.folder / "camera.toml", camera_keys(sim.camera) + "depth_units_per_m = 1000\n");
+  const CameraGeometry camera = on_hardware(run) ? read_flight_config(configuration_files(run)).camera : sim.camera;
+  write_text(run.folder / "camera.toml", camera_keys(camera) + "depth_units_per_m = 1000\n");
 }
 
 /// Asks the flight binary itself, for the rights may have been granted to it alone.
@@ -188,6 +205,17 @@ std::vector<std::string> sim_arguments(const Run& run) {
   if (!run.options.autopilot.empty()) a.insert(a.end(), {"--autopilot", run.options.autopilot});
   if (!run.options.replay.empty()) a.push_back("--no-camera");
   if (!run.options.safety_pilot) a.push_back("--no-safety-pilot");
+  return a;
+}
+
+bool on_hardware(const Run& run) { return scheduling::is_device(run.camera_driver); }
+
+/// Waits for a camera that is not there: it may be started again while the flight goes on.
+std::vector<std::string> camera_arguments(const Run& run) {
+  std::vector<std::string> a{program("wasp-camera"), "--instance", run.instance};
+  for (const auto& file : configuration_files(run)) a.insert(a.end(), {"--config", file});
+  a.insert(a.end(), {"--config", (run.folder / "override.toml").string()});
+  if (!run.real_time) a.push_back("--no-rt");
   return a;
 }
 

@@ -15,6 +15,7 @@ struct Run {
   std::filesystem::path folder;
   std::filesystem::path mission;  ///< folder with its sim.toml and flight.toml
   std::string instance;
+  std::string camera_driver = "sim";    ///< as configured; a device: real hardware, no simulator
   bool real_time = false;
   std::string note;  ///< why it is not real time
   double flight_seconds = 80;
@@ -38,6 +39,10 @@ std::filesystem::path fault_socket(const Run& run);
 
 std::vector<std::string> flight_arguments(const Run& run);
 std::vector<std::string> sim_arguments(const Run& run);
+/// Of `wasp camera`, for real hardware.
+std::vector<std::string> camera_arguments(const Run& run);
+/// True where a real camera looks and the configured autopilot flies: nothing is simulated.
+bool on_hardware(const Run& run);
 std::vector<std::string> recorder_arguments(const Run& run);
 
 /// Throws std::runtime_error naming the path.

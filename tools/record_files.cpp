@@ -100,7 +100,9 @@ void RecordSession::write_camera_toml() const {
 
 void RecordSession::write_stages() const {
   if (stages_.empty() && !run_.present) return;
-  replace_file(log("stages.json"), text_of(latency_json(stages_, run_, true), -1));
+  nlohmann::json document = latency_json(stages_, run_, true);
+  for (const auto& camera : cameras_) document["cameras"].push_back(to_json(camera));
+  replace_file(log("stages.json"), text_of(document, -1));
 }
 
 void RecordSession::write_account(const std::string& reason) const {

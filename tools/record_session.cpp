@@ -153,6 +153,12 @@ void RecordSession::take_snapshot(const Source& source) {
   if (run.present) run_ = run;
 }
 
+void RecordSession::look_at_cameras() {
+  for (const auto& source : sources_)
+    if (source.attachment.region() != nullptr && !source.from_earlier_flight)
+      if (auto cameras = read_cameras(*source.attachment.region()); !cameras.empty()) cameras_ = std::move(cameras);
+}
+
 void RecordSession::let_go(Source& source) {
   for (const TimeNs limit = rt::now() + kDrainLimit; drain(source) && rt::now() < limit;)
     rt::sleep_until(rt::now() + options_.poll_period_ns);
@@ -188,6 +194,7 @@ bool RecordSession::poll() {
   if (now - snapshot_at_ns_ >= kSnapshotPeriod) {
     snapshot_at_ns_ = now;
     take_snapshot(sources_.front());
+    look_at_cameras();
     write_stages();
   }
   return waiting;
@@ -207,6 +214,7 @@ void RecordSession::finish(const std::string& reason) {
   for (const TimeNs limit = rt::now() + kDrainLimit; poll() && rt::now() < limit;)
     rt::sleep_until(rt::now() + options_.poll_period_ns);
   take_snapshot(sources_.front());
+  look_at_cameras();
   if (pool_) pool_->finish();
   flush();
   write_stages();

@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "tools/camera_figures.h"
 #include "tools/latency_summary.h"
 #include "tools/record_attachment.h"
 #include "tools/record_frames.h"
@@ -65,6 +66,7 @@ class RecordSession {
   bool drain(Source& source);
   void let_go(Source& source);
   void take_snapshot(const Source& source);
+  void look_at_cameras();
   void note(const std::string& region, const std::string& what);
   void flush();
   void open_recording();
@@ -87,6 +89,7 @@ class RecordSession {
   std::list<Source> sources_;
   std::vector<StageSummary> stages_;
   RunSummary run_;
+  std::vector<CameraFigures> cameras_;  ///< real ones
   TimeNs finished_since_ns_ = kNever;
 };
 

@@ -94,6 +94,7 @@ TopSnapshot TopObserver::look() {
     if (region == nullptr) continue;
     for (const auto& entry : region->topics())
       if (entry.kind == shm::TopicKind::kRing) s.topics.push_back(topic_state(*region, entry, rt::now()));
+    for (auto& camera : read_cameras(*region)) s.cameras.push_back(std::move(camera));
     if (&attachment != &attachments_.front()) continue;
     s.stages = read_stages(*region);
     s.run = read_run(*region);
@@ -123,6 +124,8 @@ nlohmann::json top_json(const TopSnapshot& s) {
                                   {"rate_hz", std::round(t.rate_hz * 1000) / 1000},
                                   {"age_ms", t.age_ms ? nlohmann::json(*t.age_ms) : nlohmann::json(nullptr)},
                                   {"published", t.published}});
+  document["cameras"] = nlohmann::json::array();
+  for (const auto& camera : s.cameras) document["cameras"].push_back(to_json(camera));
   document["command"] = s.command ? command_json(*s.command) : nlohmann::json(nullptr);
   document["events"] = s.events;
   return document;

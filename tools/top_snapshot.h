@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "tools/camera_figures.h"
 #include "tools/latency_summary.h"
 #include "tools/record_attachment.h"
 #include "types/messages.h"
@@ -34,8 +35,9 @@ struct TopSnapshot {
   std::vector<TopicState> topics;
   std::vector<StageSummary> stages;
   RunSummary run;
-  std::optional<Command> command;   ///< newest
-  std::vector<std::string> events;  ///< newest last
+  std::vector<CameraFigures> cameras;  ///< real ones
+  std::optional<Command> command;      ///< newest
+  std::vector<std::string> events;     ///< newest last
 };
 
 /// Follows the three regions of an instance; each may come and go between looks.

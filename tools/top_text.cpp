@@ -104,6 +104,10 @@ std::vector<std::string> top_lines(const TopSnapshot& s) {
   lines.emplace_back();
   add_flight(s, lines);
   lines.emplace_back();
+  for (const auto& camera : s.cameras) {
+    lines.push_back(counts_text(camera));
+    lines.push_back("  " + times_text(camera));
+  }
   add_topics(s, lines);
   lines.emplace_back();
   add_stages(s, lines);

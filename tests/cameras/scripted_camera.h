@@ -101,6 +101,10 @@ class ScriptedCamera {
     }
     if (thread_.joinable()) thread_.join();
   }
+  /// With the mutex held: when the frame being emitted was due, CLOCK_MONOTONIC [ns].
+  [[nodiscard]] std::int64_t due_ns() const {
+    return std::chrono::duration_cast<std::chrono::nanoseconds>(due_.time_since_epoch()).count();
+  }
   /// With the mutex held: false while it is unplugged.
   [[nodiscard]] bool plugged() const { return Clock::now() >= back_at_; }
 
@@ -125,6 +129,7 @@ class ScriptedCamera {
 
   void run() {
     std::unique_lock lock(mutex);
+    due_ = Clock::now();
     while (streaming_) {
       const ScriptStep step = position_ < script.steps.size() ? script.steps[position_] : ScriptStep{"frames", 1, {}};
       if (!act(step, lock)) return;
@@ -150,6 +155,7 @@ class ScriptedCamera {
     } else if (step.what == "silence") {
       changed.wait_for(lock, std::chrono::milliseconds(step.number), [this] { return !streaming_; });
       if (!streaming_) ++position_;  // whoever lost patience finds it speaking again
+      due_ = Clock::now();
     } else if (step.what == "unplug") {
       back_at_ = Clock::now() + std::chrono::milliseconds(step.number);
       ++position_;
@@ -167,7 +173,7 @@ class ScriptedCamera {
   }
   bool pace(std::unique_lock<std::mutex>& lock) {
     const auto now = Clock::now();
-    due_ = std::max(due_ + period(), now - period());
+    due_ = std::max(due_ + period(), now - std::chrono::milliseconds(500));  // catches up after a standstill
     changed.wait_until(lock, due_, [this] { return !streaming_; });
     while (streaming_ && !idle()) changed.wait_for(lock, std::chrono::milliseconds(1));
     return streaming_;
