@@ -13,6 +13,8 @@
 namespace wasp::drivers {
 namespace {
 
+constexpr int kMostErrors = 3;  ///< of DQBUF in a row; more, and the queue is broken until it is set up anew
+
 /// The node to open: of the camera known from before, or the one asked for, or the only one.
 V4l2Identity find_camera(const std::optional<V4l2Identity>& known, const std::string& wanted) {
   if (!known && wanted.starts_with("/dev/")) return {wanted, {}, {}, {}};
@@ -54,6 +56,7 @@ class V4l2Camera final : public CameraDriver {
     announce_ = [&sink] { sink.announce(); };
     buffers_.emplace(*device_);
     buffers_->start(request_.settings.buffers);
+    errors_in_row_ = 0;
   }
 
   FrameEvent wait_frame(TimeNs deadline_ns) override {
@@ -66,7 +69,8 @@ class V4l2Camera final : public CameraDriver {
           if (rt::now() >= deadline_ns) return FrameEvent::kTimeout;
           rt::sleep_until(rt::now() + kMillisecond);  // woken for nothing: never spin
           continue;
-        case V4l2Take::kDamaged:
+        case V4l2Take::kDamaged:  // an error of the moment, or the queue's for good
+          if (++errors_in_row_ > kMostErrors) return FrameEvent::kGone;
           rt::sleep_until(rt::now() + kMillisecond);
           return FrameEvent::kCorrupt;
         case V4l2Take::kGone:
@@ -74,6 +78,7 @@ class V4l2Camera final : public CameraDriver {
         case V4l2Take::kFrame:
           break;
       }
+      errors_in_row_ = 0;
       const bool good = deliver(buffer);
       buffers_->give_back(buffer);
       return good ? FrameEvent::kFrame : FrameEvent::kCorrupt;
@@ -180,6 +185,7 @@ class V4l2Camera final : public CameraDriver {
   std::function<void()> announce_;
   v4l2_pix_format picture_{};
   const V4l2Pixels* pixels_ = nullptr;
+  int errors_in_row_ = 0;
   DurationNs exposure_ns_ = 0, readout_ns_ = 0;
   JpegGray jpeg_;
 };

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
@@ -40,7 +39,8 @@ void FlyWorld::start() {
 }
 
 bool FlyWorld::there() const {
-  return on_hardware(run_) ? is_written(shm::camera_region(run_.instance)) : fs::exists(run_.folder / "tty");
+  if (on_hardware(run_)) return is_written(shm::camera_region(run_.instance));
+  return run_.options.udp_port > 0 || fs::exists(run_.folder / "tty");  // over UDP the simulator speaks first
 }
 
 void FlyWorld::wait_until_there(const std::function<bool()>& given_up) {

@@ -2,6 +2,7 @@
 // hardware.
 #pragma once
 
+#include <csignal>
 #include <functional>
 #include <optional>
 

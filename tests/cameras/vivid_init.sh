@@ -35,26 +35,27 @@ control() { wasp_v4l2_control /dev/video0 $((0x00f0f000 + $1)) "$2"; }
 cd /tmp
 plug
 echo "@wasp list $(wasp-camera --list --json)"
-camera grey --rate 30 --seconds 5
+camera grey --width 320 --height 180 --rate 60 --seconds 5
 finish grey
+control 24 1 # stamps of the start of exposure from here on: those of the end lie ahead of the frame's arrival
 camera yuyv --rate 25 --pixel-format YUYV --seconds 5
 finish yuyv
 
-camera drops --rate 30 --seconds 6
+camera drops --rate 25 --seconds 6
 sleep 2
 control 64 30 # percent of the buffers are dropped
 sleep 3
 control 64 0
 finish drops
 
-camera errors --rate 30 --seconds 9
+camera errors --rate 25 --seconds 9
 sleep 2
 control 66 1 # DQBUF error: a damaged frame
 sleep 1
 control 70 1 # queue error: EIO from here on, until it is opened anew
 finish errors
 
-camera unplug --rate 30 --seconds 8
+camera unplug --rate 25 --seconds 8
 sleep 2
 control 65 1 # disconnect
 sleep 1

@@ -25,17 +25,19 @@ def main(path):
         misses += not ok
         print(f"{'ok' if ok else 'MISS':<4} {name:<60} {value}")
 
-    check("list: one camera, grey offered",
-          [f for c in figures.get("list", []) for f in c["formats"] if "640x480" in f][:3],
-          len(figures.get("list", [])) == 1 and any(f.startswith("GREY 640x480") for f in figures["list"][0]["formats"]))
-    for name, rate in (("grey", 30), ("yuyv", 25)):
+    cameras = [c for c in figures.get("list", []) if c["driver"] == "v4l2"]
+    grey = [f for c in cameras for f in c["formats"] if f.startswith("GREY 640x480")]
+    check("list: one camera, grey offered", grey, len(cameras) == 1 and len(grey) == 1)
+    for name, rate in (("grey", 60), ("yuyv", 25)):
         run = figures.get(name, [{}])[0]
         frames, period_ms = run.get("frames", 0), run.get("interval_p50_ns", 0) * 1e-6
         check(f"{name}: SCHED_FIFO, locked memory", run.get("real_time"), run.get("real_time") is True)
         check(f"{name}: frames in 5 s at {rate} Hz", frames, abs(frames - 5 * rate) <= 3)
-        check(f"{name}: dropped, damaged, late, not believed",
-              [run.get(k) for k in ("dropped", "corrupt", "timeouts", "estimated")],
-              all(run.get(k) == 0 for k in ("dropped", "corrupt", "timeouts", "estimated")))
+        check(f"{name}: dropped, damaged, late", [run.get(k) for k in ("dropped", "corrupt", "timeouts")],
+              all(run.get(k) == 0 for k in ("dropped", "corrupt", "timeouts")))
+        # vivid says when a frame will have ended, 0.9 periods after it hands it out
+        wrong = frames if name == "grey" else 0
+        check(f"{name}: time stamps not believed", run.get("estimated"), run.get("estimated") == wrong)
         check(f"{name}: period by its time stamps [ms]", f"{period_ms:.2f}", abs(period_ms - 1000 / rate) < 0.04 * 1000 / rate)
         check(f"{name}: stamp to publication p50 / max [ms]",
               f"{run.get('latency_p50_ns', 0) * 1e-6:.3f} / {run.get('latency_max_ns', 0) * 1e-6:.3f}",
@@ -43,9 +45,9 @@ def main(path):
     run = figures.get("drops", [{}])[0]
     total = run.get("frames", 0) + run.get("dropped", 0)
     check("drops: seen in the sequence", run.get("dropped"), run.get("dropped", 0) >= 5)
-    check("drops: published and dropped make the whole", total, abs(total - 180) <= 4)
+    check("drops: published and dropped make the whole", total, abs(total - 150) <= 5)
     run = figures.get("errors", [{}])[0]
-    check("errors: damaged frames counted", run.get("corrupt"), run.get("corrupt", 0) >= 1)
+    check("errors: damaged frames counted", run.get("corrupt"), 1 <= run.get("corrupt", 0) <= 10)
     check("errors: a broken queue is opened anew", run.get("reopened"), run.get("reopened") == 1)
     run = figures.get("unplug", [{}])[0]
     check("unplug: lost and found again", run.get("reopened"), run.get("reopened") == 1)
