@@ -136,6 +136,8 @@ CommandResult AutopilotLink::set_interval(const mavlink::CommandLong& command) {
   else if (is(Flavour::kPx4) ? id == mavlink::AttitudeQuaternion::kId
                              : is(Flavour::kArduPilot) && id == mavlink::Attitude::kId)
     attitude_every_ = ticks;
+  else if (!is(Flavour::kWasp) && id == mavlink::LocalPositionNed::kId)
+    position_every_ = ticks;
   else
     return CommandResult::kDenied;
   return CommandResult::kAccepted;
@@ -184,6 +186,7 @@ CommandResult AutopilotLink::reboot(const mavlink::CommandLong& command, TimeNs 
   flight_.restart();
   apply_parameters();
   beat_every_ = kTicksPerSecond;
+  position_every_ = 0;
   imu_every_ = is(Flavour::kArduPilot) ? 100 : is(Flavour::kPx4) ? 4 : 1;  // what was asked of it is forgotten
   attitude_every_ = is(Flavour::kArduPilot) ? 50 : 2;
   failures_ = SensorFailures();
@@ -236,6 +239,7 @@ void AutopilotLink::step(const ImuSample& imu, TimeNs now_ns) {
   if (now_ns < silent_until_ns_) return;
   if (ticks_ % imu_every_ == 0) send_imu(imu, now_ns);
   if (ticks_ % attitude_every_ == 0) send_attitude(now_ns);
+  if (position_every_ > 0 && ticks_ % position_every_ == 0) send_local_position(now_ns);
   if (ticks_ % beat_every_ == 0) send_heartbeat();
   const std::uint64_t asks_every = is(Flavour::kPx4) ? kTicksPerSecond / 10 : kTicksPerSecond;
   if (ticks_ % asks_every == asks_every / 2) {
@@ -260,6 +264,12 @@ void AutopilotLink::send_heartbeat() {
   m.system_status = flight_.descending() ? 5 : flight_.armed() ? 4 : 3;
   m.mavlink_version = 3;
   send(m);
+}
+
+void AutopilotLink::send_local_position(TimeNs now_ns) {
+  const auto &p = position_ned_m_, &v = velocity_ned_mps_;
+  send(mavlink::LocalPositionNed{static_cast<std::uint32_t>(own_time(now_ns) / kMillisecond), p.x(), p.y(), p.z(),
+                                 v.x(), v.y(), v.z()});
 }
 
 void AutopilotLink::send_attitude(TimeNs now_ns) {

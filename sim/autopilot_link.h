@@ -26,6 +26,10 @@ class AutopilotLink {
 
   /// Bytes from the companion, in any pieces.
   void receive(std::span<const std::uint8_t> bytes, TimeNs now_ns);
+  /// Where an estimator with a satellite receiver would have it, for LOCAL_POSITION_NED; sent when asked for.
+  void set_local_position(const Vec3& position_ned_m, const Vec3& velocity_ned_mps) {
+    position_ned_m_ = position_ned_m, velocity_ned_mps_ = velocity_ned_mps;
+  }
   /// Once for every IMU sample (200 Hz): queues what is due.
   void step(const ImuSample& imu, TimeNs now_ns);
   /// What is wrong with the sensors, on command: to be applied to a sample before anybody reads it.
@@ -57,6 +61,7 @@ class AutopilotLink {
   void on_timesync(const mavlink::Timesync& sync, const mavlink::Frame& frame, TimeNs now_ns);
   void send_heartbeat();
   void send_attitude(TimeNs now_ns);
+  void send_local_position(TimeNs now_ns);
   void send_imu(const ImuSample& imu, TimeNs now_ns);
   void send_text(std::string_view text, std::uint8_t severity);
   [[nodiscard]] TimeNs own_time(TimeNs now_ns) const { return now_ns + clock_offset_ns_; }
@@ -73,6 +78,8 @@ class AutopilotLink {
   AutopilotParameters parameters_;
   std::uint64_t ticks_ = 0, frames_received_ = 0, setpoints_dropped_ = 0;
   std::uint64_t beat_every_ = 200, imu_every_ = 1, attitude_every_ = 2;  ///< ticks
+  std::uint64_t position_every_ = 0;                                     ///< 0: not asked for
+  Vec3 position_ned_m_ = Vec3::Zero(), velocity_ned_mps_ = Vec3::Zero();
 };
 
 /// HEARTBEAT.custom_mode of a mode.

@@ -55,6 +55,7 @@ void Simulator::control_tick() {
   const PilotTrim trim = pilot_.step(state, commanded, flight_.armed() && !state.on_ground);
   flight_.set_trim(trim.roll_rad, trim.pitch_rad, trim.yaw_rate_radps);
   wanted_radps_ = flight_.step(imu, state.on_ground, now_ns_);
+  link_.set_local_position(state.position_ned_m.cast<float>(), state.velocity_ned_mps.cast<float>());
   link_.step(imu, now_ns_);
 }
 
