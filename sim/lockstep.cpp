@@ -7,13 +7,21 @@
 namespace wasp::sim {
 namespace {
 
-constexpr std::uint32_t kFollowMode = 1;
+constexpr DurationNs kQuestionPeriod = 20 * kMillisecond;
 constexpr DurationNs kStep_ns = 5 * kMillisecond;
 constexpr std::size_t kKeptAttitudes = 100, kKeptImu = 400;
 
 template <class T>
 void keep_last(std::deque<T>& queue, std::size_t n) {
   while (queue.size() > n) queue.pop_front();
+}
+
+drivers::SetupWish wish_of(const LockstepOptions& o) {
+  drivers::SetupWish wish;
+  wish.flavour = o.sim.flavour;
+  wish.mode = drivers::facts_of(o.sim.flavour).own_mode;
+  wish.max_tilt_rad = o.control.limits.max_tilt_rad;
+  return wish;
 }
 
 std::size_t pixels_of(const SimCamera& camera) {
@@ -27,6 +35,7 @@ Lockstep::Lockstep(const LockstepOptions& options)
       simulator_(options.sim),
       scene_(make_world_scene(options.sim)),
       front_(scene_, options.sim.front(), options.sim.sensor, options.sim.seed),
+      setup_(wish_of(options), drivers::LinkIdentity{}),
       gray_(pixels_of(front_)),
       depth_mm_(pixels_of(front_)),
       stepped_at_ns_(control::kMaxBehaviours, kNever) {
@@ -67,10 +76,20 @@ void Lockstep::exchange(TimeNs now_ns) {
   link_.receive(bytes_, now_ns, *this);
   keep_last(attitudes_, kKeptAttitudes);
   keep_last(imu_, kKeptImu);
+  if (now_ns % kQuestionPeriod == 0) ask(now_ns);
   if (now_ns < timesync_due_ns_) return;
   timesync_due_ns_ = now_ns + 200 * kMillisecond;
   std::array<std::uint8_t, mavlink::kMaxFrame> out;
   reply(std::span<const std::uint8_t>(out.data(), link_.encode_timesync_request(now_ns, out)));
+}
+
+/// What the link thread does about an autopilot of another flavour.
+void Lockstep::ask(TimeNs now_ns) {
+  std::array<std::uint8_t, mavlink::kMaxFrame> out;
+  if (const std::size_t n = setup_.next_question(now_ns, link_, out); n != 0)
+    reply(std::span<const std::uint8_t>(out.data(), n));
+  input_.autopilot.semantics = setup_.semantics();
+  input_.may_arm = setup_.bar() == drivers::SetupBar::kNone;
 }
 
 void Lockstep::on_imu(const ImuSample& sample) noexcept {
@@ -84,7 +103,9 @@ void Lockstep::on_imu(const ImuSample& sample) noexcept {
 
 void Lockstep::on_heartbeat(const drivers::AutopilotStatus& status) noexcept {
   input_.autopilot.armed = status.armed;
-  input_.autopilot.follows = status.custom_mode == kFollowMode;
+  const Flavour flavour = options_.sim.flavour;
+  input_.autopilot.follows = drivers::main_mode_of(flavour, status.custom_mode) == drivers::facts_of(flavour).own_mode;
+  setup_.on_heartbeat(status);
 }
 
 void Lockstep::expose_front(TimeNs now_ns) {
@@ -190,13 +211,18 @@ void Lockstep::send(const control::ControlOutput& output, TimeNs now_ns) {
   std::array<std::uint8_t, mavlink::kMaxFrame> out;
   const auto give = [&](std::size_t n) { simulator_.from_companion(std::span<const std::uint8_t>(out.data(), n)); };
   const Command& c = output.command;
-  if (c.sent != 0) give(link_.encode_attitude_target({c.q_ned_body, true, c.yaw_rate_radps, c.thrust}, now_ns, out));
-  const bool ask_arm = output.ask_arm || output.ask_follow;
-  if ((ask_arm || output.ask_disarm) && now_ns >= request_due_ns_) {
-    if (ask_arm) give(link_.encode_set_mode(kFollowMode, 0, 0, out));
-    give(link_.encode_arm(ask_arm, 0, out));
-    request_due_ns_ = now_ns + 500 * kMillisecond;
-  }
+  const drivers::FlavourFacts& facts = drivers::facts_of(options_.sim.flavour);
+  const bool by_rate = input_.autopilot.semantics.heading_rate_used;
+  if (c.sent != 0) give(link_.encode_attitude_target({c.q_ned_body, by_rate, c.yaw_rate_radps, c.thrust}, now_ns, out));
+  if (c.sent == 0) streaming_since_ns_ = kNever;
+  if (c.sent != 0 && streaming_since_ns_ == kNever) streaming_since_ns_ = now_ns;
+  const bool streamed = streaming_since_ns_ != kNever && now_ns - streaming_since_ns_ >= facts.stream_first_ns;
+  const bool ask_mode = (output.ask_follow || (!facts.asks_in_turn && output.ask_arm)) && streamed;
+  const bool ask_arm = output.ask_arm && (!facts.asks_in_turn || input_.autopilot.follows);
+  if ((!ask_mode && !ask_arm && !output.ask_disarm) || now_ns < request_due_ns_) return;
+  if (ask_mode) give(link_.encode_set_mode(facts.own_mode, 0, 0, out));
+  if (ask_arm || output.ask_disarm) give(link_.encode_arm(ask_arm, 0, out));
+  request_due_ns_ = now_ns + 500 * kMillisecond;
 }
 
 }  // namespace wasp::sim

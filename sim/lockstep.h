@@ -11,6 +11,7 @@
 
 #include "control/control_step.h"
 #include "drivers/autopilot_link.h"
+#include "drivers/autopilot_setup.h"
 #include "sim/sim_camera.h"
 #include "sim/simulator.h"
 #include "types/behaviour.h"
@@ -75,7 +76,11 @@ class Lockstep {
 
   // What AutopilotLink::receive calls.
   void on_imu(const ImuSample& sample) noexcept;
-  void on_attitude(const AttitudeSample& sample) noexcept { attitudes_.push_back(sample); }
+  void on_attitude(const AttitudeSample& sample) noexcept {
+    attitudes_.push_back(sample);
+    setup_.on_attitude(simulator_.now_ns());
+  }
+  void on_frame(const mavlink::Frame& frame) noexcept { setup_.on_frame(frame); }
   void on_heartbeat(const drivers::AutopilotStatus& status) noexcept;
   void on_ack(std::uint16_t, std::uint8_t) noexcept {}
   void on_statustext(std::uint8_t, std::string_view) noexcept {}
@@ -83,6 +88,7 @@ class Lockstep {
 
  private:
   void exchange(TimeNs now_ns);
+  void ask(TimeNs now_ns);
   void expose_front(TimeNs now_ns);
   void expose_down(TimeNs now_ns);
   void step_all(bool down, BehaviourInput input);
@@ -98,6 +104,7 @@ class Lockstep {
   SimCamera front_;
   std::optional<SimCamera> down_;
   drivers::AutopilotLink link_;
+  drivers::AutopilotSetup setup_;  ///< asks an autopilot of another flavour (sim.flavour) what it needs
   control::ControlState state_;
   control::ControlInput input_;
   std::vector<std::uint8_t> gray_, gray_down_, bytes_;
@@ -111,7 +118,7 @@ class Lockstep {
   control::PressureMean pressure_;
   int accel_count_ = 0;
   std::uint32_t frame_ = 0, down_frame_ = 0;
-  TimeNs request_due_ns_ = 0, timesync_due_ns_ = 0;
+  TimeNs request_due_ns_ = 0, timesync_due_ns_ = 0, streaming_since_ns_ = kNever;
 };
 
 }  // namespace wasp::sim
