@@ -24,9 +24,12 @@ std::string name_of_message(std::uint32_t id) {
 LinkSession::LinkSession(const scheduling::AutopilotConfig& config)
     : config_(config),
       port_(drivers::Endpoint::parse(config.endpoint)),
+      signing_(drivers::open_signing(config.signing, drivers::LinkSigning::kFlightLink)),
       link_(config.identity()),
       setup_(config.wish(kMaxTilt_rad), config.identity()),
-      started_ns_(rt::now()) {}
+      started_ns_(rt::now()) {
+  if (signing_) link_.use_signing(*signing_);
+}
 
 void LinkSession::say(const std::string& text) const {
   fmt::print("{:8.2f} s  {}\n", to_seconds(rt::now() - started_ns_), text);

@@ -43,6 +43,7 @@ class LinkSession {
 
   scheduling::AutopilotConfig config_;
   drivers::LinePort port_;
+  std::unique_ptr<drivers::LinkSigning> signing_;  ///< of a signed line
   drivers::AutopilotLink link_;
   drivers::AutopilotSetup setup_;
   mavlink::Parser counter_;                                               ///< sees every message, from whomever
