@@ -9,9 +9,9 @@ constexpr int kFault_s = 15;     // a flight and its landing, about
 constexpr int kWatchdog_s = 40;  // two flights
 /// Deaths, a hanging thread, what stops coming, the wall clock, no budget: what a promise in milliseconds is made of.
 constexpr const char* kFaults =
-    "^(flight-(killed|segv|stopped)|control-thread-stops|attitude-stop|line-silence|wall-clock-year-ahead|"
+    "^(flight-(killed|segv)|control-thread-stops|attitude-stop|line-silence|wall-clock-year-ahead|"
     "start-budget-of-the-kernel)$";
-constexpr int kFaultCount = 8;
+constexpr int kFaultCount = 7;
 /// All but what needs a camera, a second core, or programs that are not in the guest.
 constexpr const char* kAllFaults =
     "^(attitude|imu|wire|sensor|line|autopilot|stranger|behaviour|control|link|flight|guardian|monitor|policy|priority|"
