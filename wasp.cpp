@@ -36,6 +36,7 @@ constexpr const char* kUsage =
     "  report   make report.html of a logged flight\n"
     "  link     who is on a line, what comes how often, and whether that autopilot can be flown by setpoints\n"
     "  doctor   find out by doing whether this machine can fly real time, and what would change that\n"
+    "  calibrate accelerometer, magnetometer, ... from recorded data: TOML for the flight, or a refusal\n"
     "  eval     run one vision kernel over a folder of recordings\n"
     "  iceoryx  export topics to iceoryx, or import a camera from it\n"
     "  bench    benchmarks: latency, ipc, vision, micro\n"

@@ -228,6 +228,7 @@ void settle(Config& c) {
 void read_document(TomlTable root, Config& c, bool foreign_behaviours) {
   read_run(root.table("run"), c);
   read_autopilot(root.table("autopilot"), c.autopilot);
+  root.table("calibration");  // the evidence that `wasp calibrate` writes beside its values: for people
   read_camera(root.table("camera"), c);
   read_camera_down(root.table("camera_down"), c.camera_down);
   read_mission(root.table("mission"), c);

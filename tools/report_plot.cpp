@@ -140,7 +140,9 @@ void draw_curve(const Curve& curve, const Frame& f, Out out) {
   for (std::size_t i = 0; i < curve.series.size(); ++i) {
     const double x = curve.series.x[i], y = curve.series.y[i];
     const bool drawable = std::isfinite(x) && std::isfinite(y);
-    if (drawable) fmt::format_to(out, "{}{:.1f} {:.1f}", pen_down ? 'L' : 'M', f.px(x), f.py(y));
+    if (drawable && curve.style.stroke == "dots")
+      fmt::format_to(out, "M{:.1f} {:.1f}h.01", f.px(x), f.py(y));
+    else if (drawable) fmt::format_to(out, "{}{:.1f} {:.1f}", pen_down ? 'L' : 'M', f.px(x), f.py(y));
     pen_down = drawable;
   }
   fmt::format_to(out, "'/>");

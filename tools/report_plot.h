@@ -9,7 +9,7 @@
 
 namespace wasp::tools {
 
-/// How a curve looks: a colour class and a stroke class ("thin", "thick", "dashed").
+/// How a curve looks: a colour class and a stroke class ("thin", "thick", "dashed"; "dots": its points, unjoined).
 struct CurveStyle {
   std::string colour = "c0";
   std::string stroke = "thin";

@@ -37,6 +37,7 @@ svg .mid{text-anchor:middle}svg .end{text-anchor:end}svg .faint,svg .name{fill:v
 svg .halo{paint-order:stroke;stroke:var(--card);stroke-width:3;stroke-opacity:.85}
 .span0{fill:var(--span)}.span1{fill:transparent}
 .line{fill:none;stroke-linejoin:round}.thin{stroke-width:1.2}.medium{stroke-width:1.6}.thick{stroke-width:2.2}
+.dots{stroke-width:3.4;stroke-linecap:round}
 .soft.line{stroke-opacity:.6}.dashed{stroke-dasharray:7 4}
 .c0{stroke:var(--c0)}.c1{stroke:var(--c1)}.c2{stroke:var(--c2)}.c3{stroke:var(--c3)}.c4{stroke:var(--c4)}
 .c5{stroke:var(--c5)}.ink{stroke:var(--ink)}

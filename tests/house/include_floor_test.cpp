@@ -26,6 +26,8 @@ const std::map<std::string, std::set<std::string>> kMayInclude = {
     {"tools", {"types", "rt", "shm", "messages", "drivers", "vision", "control", "scheduling", "sim"}},
     {"benchmarks", {"types", "rt", "shm", "messages", "drivers", "vision", "control", "scheduling", "sim", "tools"}},
     {"missions", {"types", "rt", "shm", "messages", "drivers", "vision", "control", "scheduling", "sim", "tools"}},
+    {"calibration",
+     {"types", "rt", "shm", "messages", "drivers", "vision", "control", "scheduling", "sim", "tools"}},
     {"faults", {"types", "rt", "shm", "messages", "drivers", "vision", "control", "scheduling", "sim", "tools"}},
 };
 
