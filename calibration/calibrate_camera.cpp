@@ -129,9 +129,13 @@ Trial best_pinhole(const BoardViews& found, const CameraOptions& o, ProgressBar&
   if (o.k3 == "on") return *std::move(with);
   bar.show(0.75, "pinhole without k3");
   Trial without = try_model(found, {LensKind::kPinhole, false}, o);
-  if (with && with->evidence.held_out_rms_px < kClearlyBetter * without.evidence.held_out_rms_px)
+  if (!with) return without;
+  if (cells_without_ray(with->views, with->fit) > cells_without_ray(without.views, without.fit))
+    without.evidence.notes.push_back("k3 is 0: with it the lens folds back within the image, beyond the corners");
+  else if (with->evidence.held_out_rms_px < kClearlyBetter * without.evidence.held_out_rms_px)
     return *std::move(with);
-  if (with) without.evidence.notes.push_back("k3 is 0: with it held-out views are no better");
+  else
+    without.evidence.notes.push_back("k3 is 0: with it held-out views are no better");
   return without;
 }
 
@@ -199,6 +203,8 @@ Solution solve_camera(const CameraOptions& o, ProgressBar& bar) {
   check_fit(best, o.lens);
   if (all > found.views.size())
     best.evidence.notes.push_back(fmt::format("{} of {} views used, those that differ most", found.views.size(), all));
+  if (const int blind = cells_without_ray(best.views, best.fit); blind > 0)
+    best.evidence.notes.push_back(fmt::format("{} parts of the image have no ray: bring the board there", blind));
   for (const auto& problem : found.problems) best.evidence.notes.push_back("skipped: " + problem);
   return camera_solution(best.views, best.fit, best.evidence, fmt::format("{}, {} images", o.folder, found.images));
 }

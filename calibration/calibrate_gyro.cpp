@@ -45,7 +45,7 @@ Steady longest_steady(const Samples& s, double typical, const std::string& what)
 /// Everything at rest: what it reads, and how that drifts with temperature.
 struct Rest {
   Vector3d bias, sigma, slope = Vector3d::Zero(), slope_sigma = Vector3d::Zero();
-  Vector3d noise_density;  ///< unit per root hertz
+  Vector3d noise;  ///< standard deviation of a sample
   double at_degc = 0;
   bool warmth = false;
   std::vector<RestPeriod> windows;
@@ -104,11 +104,10 @@ Rest rest_of(const Samples& s, double typical, std::optional<double> to_flight) 
   for (const auto& w : r.windows)
     for (int axis = 0; axis < 3; ++axis)
       noise[axis].push_back(w.sigma_of_mean[axis] * std::sqrt(static_cast<double>(w.count)));
-  const double rate = s.rate_hz();
   for (int axis = 0; axis < 3; ++axis) {
     std::nth_element(noise[axis].begin(), noise[axis].begin() + static_cast<std::ptrdiff_t>(noise[axis].size() / 2),
                      noise[axis].end());
-    r.noise_density[axis] = rate > 0 ? noise[axis][noise[axis].size() / 2] / std::sqrt(rate) : 0;
+    r.noise[axis] = noise[axis][noise[axis].size() / 2];
   }
   fit_bias(r);
   if (to_flight && r.bias.cwiseAbs().maxCoeff() * *to_flight > kMostBias_radps)
@@ -193,7 +192,7 @@ TomlSection evidence_of(const Samples& s, const Rest& rest, const std::array<std
     t.numbers("bias_per_degc", list(rest.slope))
         .numbers("bias_per_degc_sigma", list(rest.slope_sigma))
         .number("at_degc", rest.at_degc);
-  if (s.rate_hz() > 0) t.numbers("noise_density", list(rest.noise_density), s.unit + " per root hertz");
+  t.numbers("noise", list(rest.noise), "standard deviation of a sample");
   t.whole("rest_samples", static_cast<long long>(rest.count)).whole("rows_dropped", static_cast<long long>(s.dropped));
   for (std::size_t i = 0; i < 3; ++i) {
     if (!scales[i]) continue;
@@ -299,14 +298,8 @@ Solution solve_gyro(const GyroOptions& o, ProgressBar& bar) {
   out.source = s.source;
   out.samples = rest.count;
   for (const Steady& r : readings) out.samples += r.count;
-  double sum = 0;
-  for (const auto& w : rest.windows)
-    sum += (w.mean - rest.bias -
-            (rest.warmth ? Vector3d(rest.slope * (w.temperature_degc - rest.at_degc)) : Vector3d::Zero()))
-               .squaredNorm() /
-           3;
-  out.residual_rms = turns.empty() ? std::sqrt(sum / static_cast<double>(rest.windows.size())) : worst;
-  out.residual_unit = s.unit + (turns.empty() ? ", means of a second of rest" : ", worst axis about its line");
+  out.residual_rms = turns.empty() ? rest.noise.norm() / std::sqrt(3.0) : worst;
+  out.residual_unit = s.unit + (turns.empty() ? ", a sample of rest about the bias" : ", worst axis about its line");
   out.pictures = pictures_of(s, rest, turns, readings, scales);
   return out;
 }

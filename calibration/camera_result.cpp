@@ -51,6 +51,9 @@ TomlSection evidence_of(const BoardViews& views, const LensFit& fit, const Camer
   const bool fisheye = fit.model.kind == LensKind::kFisheye;
   for (Eigen::Index i = 0; i < fit.sigma.size(); ++i)
     t.number(std::string(fisheye ? kFisheye[i] : kPinhole[i]) + "_sigma", fit.sigma[i]);
+  for (Eigen::Index i = 0; i < 4; ++i)
+    t.number(std::string(kPinhole[i]) + "_bias", fit.bias[i],
+             fmt::format("at most, by corners seen {} px wrong in all views alike", kCornerBias_px));
   const ImageCoverage coverage = image_coverage(views, fit);
   t.number("widest_tilt_deg", widest_tilt(fit) * 180 / std::numbers::pi, "between any two views");
   t.whole("cells_with_corners", coverage.cells, fmt::format("of {}", ImageCoverage::kColumns * ImageCoverage::kRows));
@@ -61,7 +64,10 @@ TomlSection evidence_of(const BoardViews& views, const LensFit& fit, const Camer
   if (!known.empty())
     t.number("projection_sigma_px", tools::median(known), "median over the image")
         .number("projection_sigma_worst_px", *std::max_element(known.begin(), known.end()));
-  t.numbers("view_rms_px", fit.view_rms);
+  t.whole("cells_without_ray", cells_without_ray(views, fit), "where the polynomial folds back");
+  std::vector<double> rounded;
+  for (const double rms : fit.view_rms) rounded.push_back(std::round(rms * 1e4) * 1e-4);
+  t.numbers("view_rms_px", rounded);
   t.text("removed", fmt::format("{}", fmt::join(e.removed, ", ")));
   return t;
 }
@@ -80,8 +86,7 @@ Picture residual_picture(const BoardViews& views, const LensFit& fit) {
   plot.width = 1100, plot.height = 60 + 1000 * views.image.height / views.image.width;
   plot.equal_axes = true;
   tools::Curve dots{fmt::format("corners of {} views", views.views.size()), {"c2", "dots"}, {}};
-  tools::Curve errors{
-      fmt::format("error x {:g} ({:.3f} px rms, held out {})", scale, fit.rms, "in the TOML"), {"c1", "thin"}, {}};
+  tools::Curve errors{fmt::format("error x {:g} ({:.3f} px rms)", scale, fit.rms), {"c1", "thin"}, {}};
   for (std::size_t v = 0; v < views.views.size(); ++v)
     for (std::size_t i = 0; i < views.views[v].corners.size(); ++i) {
       const auto& p = views.views[v].corners[i];
@@ -122,6 +127,11 @@ Picture coverage_picture(const BoardViews& views, const LensFit& fit) {
 }
 
 }  // namespace
+
+int cells_without_ray(const BoardViews& views, const LensFit& fit) {
+  const auto sigmas = projection_sigmas(views, fit);
+  return static_cast<int>(std::count_if(sigmas.begin(), sigmas.end(), [](double s) { return !std::isfinite(s); }));
+}
 
 ImageCoverage image_coverage(const BoardViews& views, const LensFit& fit) {
   ImageCoverage out;

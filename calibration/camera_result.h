@@ -18,6 +18,9 @@ struct ImageCoverage {
 };
 ImageCoverage image_coverage(const BoardViews& views, const LensFit& fit);
 
+/// Parts of the image for whose centre the lens has no ray: beyond the corners its polynomial folds back.
+int cells_without_ray(const BoardViews& views, const LensFit& fit);
+
 /// What was tried and found beside the fit itself.
 struct CameraEvidence {
   double held_out_rms_px = 0;

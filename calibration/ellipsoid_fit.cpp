@@ -187,9 +187,10 @@ Parameters refine(const EllipsoidModel& model, Parameters p, const Samples& samp
   return p;
 }
 
-/// Standard deviation by the median; never below `least`.
-double robust_sigma(const Parameters& p, const Samples& samples, double least) {
-  return std::max(1.4826 * median_residual(p, samples), least);
+/// Standard deviation by the median, widened for few samples (Rousseeuw and Leroy 1987); never below `least`.
+double robust_sigma(const EllipsoidModel& model, const Parameters& p, const Samples& samples, double least) {
+  const double spare = std::max(1.0, static_cast<double>(samples.size()) - model.parameters());
+  return std::max(1.4826 * (1 + 5 / spare) * median_residual(p, samples), least);
 }
 
 VectorXd tukey_weights(const Parameters& p, const Samples& samples, double sigma) {
@@ -284,8 +285,9 @@ std::optional<Ellipsoid> fit_ellipsoid(const Samples& samples, const EllipsoidMo
   VectorXd used = VectorXd::Ones(static_cast<Eigen::Index>(samples.size()));
   if (static_cast<int>(samples.size()) >= 2 * model.parameters()) {  // with fewer, nobody can tell who is the outlier
     for (int round = 0; round < 15; ++round)
-      p = refine(model, p, scaled, tukey_weights(p, scaled, std::max(robust_sigma(p, scaled, least_sigma), 1e-6)));
-    used = inliers(p, scaled, robust_sigma(p, scaled, std::max(least_sigma, 1e-6)));
+      p = refine(model, p, scaled,
+                 tukey_weights(p, scaled, std::max(robust_sigma(model, p, scaled, least_sigma), 1e-6)));
+    used = inliers(p, scaled, robust_sigma(model, p, scaled, std::max(least_sigma, 1e-6)));
   }
   if (used.sum() < model.parameters()) return std::nullopt;
   p = refine(model, p, scaled, used);

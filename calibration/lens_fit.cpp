@@ -116,6 +116,7 @@ void complete(const Board& board, const Views& views, LensFit& fit) {
   fit.rms = std::sqrt(cost / points);
   const MatrixXd inverse = normal.completeOrthogonalDecomposition().pseudoInverse();
   fit.covariance = inverse * (spare > 0 ? cost / spare : std::numeric_limits<double>::infinity());
+  fit.bias = kCornerBias_px * (2 * points * inverse.diagonal()).cwiseMax(0).cwiseSqrt();
   const MatrixXd by_view = inverse * middle * inverse;
   fit.sigma = fit.covariance.diagonal().cwiseMax(by_view.diagonal()).cwiseMax(0).cwiseSqrt();
 }

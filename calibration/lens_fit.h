@@ -17,6 +17,9 @@ struct LensModel {
   bool k3 = true;  ///< pinhole only
 };
 
+/// Common to all views, so that no scatter shows it: of the detector, the paper, the lens that is no polynomial.
+inline constexpr double kCornerBias_px = 0.03;
+
 using Corners = std::vector<cv::Point2f>;
 
 /// What is known of one camera. Parameters in the order fx fy cx cy, then k1 k2 p1 p2 [k3] or k1 k2 k3 k4.
@@ -30,6 +33,7 @@ struct LensFit {
   double rms = 0;
   Eigen::MatrixXd covariance;  ///< of the parameters, from scatter
   Eigen::VectorXd sigma;       ///< one standard deviation: the largest of scatter, view by view, and jackknife
+  Eigen::VectorXd bias;        ///< most that corners seen kCornerBias_px wrong, all in the worst pattern, would move it
 
   [[nodiscard]] Eigen::VectorXd parameters() const;
 };
