@@ -32,6 +32,7 @@ constexpr const char* kUsage =
     "  sim      the simulator: camera and autopilot as another process\n"
     "  world    make and look at simulated worlds, VRML97 files\n"
     "  camera   a real camera (V4L2, IIDC, Kinect) into shared memory; --list shows what is plugged in\n"
+    "  kinect   a Kinect that is not there: dumps for fakenect, depth models\n"
     "  top      live rates, ages and latencies of a running flight, read-only\n"
     "  record   log a running flight, read-only\n"
     "  report   make report.html of a logged flight\n"
