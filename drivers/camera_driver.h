@@ -33,9 +33,9 @@ struct CameraSettings {
   std::string trigger = "off";  ///< off | external
   int buffers = 4;              ///< exposures the device may hold before one is lost
   double readout_us = -1;       ///< from the end of the exposure to the device's time stamp; -1: the driver's estimate
-  std::string depth_mode;       ///< kinect: raw ("" as well) | registered | mm
-  std::string depth_model = "tangent";           ///< kinect, raw: two-gaussians | tangent | linear
-  std::vector<double> depth_coefficients;        ///< of that model (drivers/kinect_depth.h); empty: the published ones
+  std::string depth_mode = "raw";                 ///< kinect: raw | registered | mm
+  std::string depth_model = "tangent";            ///< kinect, raw: two-gaussians | tangent | linear
+  std::vector<double> depth_coefficients;         ///< of that model (drivers/kinect_depth.h); empty: the published ones
   std::array<float, 2> depth_range_m{0.4f, 7.f};  ///< kinect: nearer or farther counts as no reading
 };
 

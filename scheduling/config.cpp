@@ -76,6 +76,10 @@ void read_camera_settings(TomlTable& t, drivers::CameraSettings& s) {
   t.text_value("trigger", s.trigger, {"off", "external"});
   t.number("buffers", s.buffers, 2, 32);
   t.number("readout_us", s.readout_us, -1, 1e6);
+  t.text_value("depth_mode", s.depth_mode, {"raw", "registered", "mm"});
+  t.text_value("depth_model", s.depth_model, {"two-gaussians", "tangent", "linear"});
+  t.numbers("depth_coefficients", s.depth_coefficients, -1e300, 1e300);
+  read_vector(t, "depth_range_m", s.depth_range_m, 0.1, 20);
 }
 
 void read_camera(TomlTable t, Config& c) {

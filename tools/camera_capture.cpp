@@ -49,7 +49,7 @@ drivers::CameraFormat CameraCapture::open() {
   status.name.fill(0);
   format.identity.copy(status.name.data(), status.name.size() - 1);
   status.state = static_cast<std::uint32_t>(CameraState::kStreaming);
-  last_frame_ns_ = rt::now();
+  opened_at_ns_ = last_frame_ns_ = rt::now();
   return format;
 }
 
@@ -115,6 +115,8 @@ bool CameraCapture::find_again() {
 }
 
 void CameraCapture::search(const std::atomic<bool>& stop) {
+  // One that goes as soon as it is open must not spin.
+  if (lost_at_ns_ - opened_at_ns_ < kSecond) rt::sleep_until(rt::now() + kSearchPeriod);
   while (!stop.load(std::memory_order_relaxed) && !find_again()) rt::sleep_until(rt::now() + kSearchPeriod);
 }
 

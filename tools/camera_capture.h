@@ -42,7 +42,7 @@ class CameraCapture {
   scheduling::EventQueue& events_;
   std::unique_ptr<drivers::CameraDriver> driver_;
   std::string account_;
-  TimeNs last_frame_ns_ = 0;
+  TimeNs opened_at_ns_ = 0, last_frame_ns_ = 0;
   TimeNs lost_at_ns_ = kNever;  ///< kNever: it is there
   std::string said_;            ///< the last reason why it cannot be opened
 };
