@@ -1,7 +1,7 @@
 # wasp-doctor, and the wake-up measurement it shares with wasp-bench. Included from tools/CMakeLists.txt.
 find_package(ZLIB REQUIRED)  # /proc/config.gz
 
-add_library(wasp_wakeup STATIC cyclictest.cpp piped_child.cpp quantiles.cpp wakeups.cpp)
+add_library(wasp_wakeup STATIC cyclictest.cpp piped_child.cpp wakeups.cpp)
 target_link_libraries(wasp_wakeup PUBLIC wasp_launcher wasp_flight_config)
 
 add_library(wasp_doctor STATIC doctor_check.cpp doctor_cores.cpp doctor_devices.cpp doctor_kernel.cpp doctor_plan.cpp
