@@ -221,17 +221,6 @@ std::vector<std::string> camera_arguments(const Run& run) {
   return a;
 }
 
-bool on_hardware(const Run& run) { return scheduling::is_device(run.camera_driver); }
-
-/// Waits for a camera that is not there: it may be started again while the flight goes on.
-std::vector<std::string> camera_arguments(const Run& run) {
-  std::vector<std::string> a{program("wasp-camera"), "--instance", run.instance};
-  for (const auto& file : configuration_files(run)) a.insert(a.end(), {"--config", file});
-  a.insert(a.end(), {"--config", (run.folder / "override.toml").string()});
-  if (!run.real_time) a.push_back("--no-rt");
-  return a;
-}
-
 std::vector<std::string> recorder_arguments(const Run& run) {
   std::vector<std::string> a{program("wasp-record"), "--instance", run.instance, "--out", run.folder.string()};
   if (run.options.record) a.insert(a.end(), {"--frames", "--camera-toml", (run.folder / "camera.toml").string()});
