@@ -37,7 +37,6 @@ TEST(FlightChild, FindsPageAndLine) {
       {"/bin/sh", "-c",
        "[ -e /proc/self/fd/4 ] && [ -S /proc/self/fd/5 ] && readlink /proc/self/fd/3 | grep -q wasp-guard"},
       page.fd(), STDERR_FILENO, anywhere(), false);
-  child.go();
   ASSERT_TRUE(test::eventually([&] { return child.poll().has_value(); }));
   EXPECT_EQ(child.poll()->code, 0);
 }

@@ -20,9 +20,9 @@ Scene with_moving_parts() {
   return scene;
 }
 
-class EveryKind : public testing::TestWithParam<SceneKind> {};
+class BytesOfAScene : public testing::TestWithParam<SceneKind> {};
 
-TEST_P(EveryKind, ComesBackToTheBit) {
+TEST_P(BytesOfAScene, ComesBackToTheBit) {
   const Scene scene = GetParam().make({.seed = 5});
   const auto bytes = scene_bytes(scene);
   const Scene again = scene_of_bytes(bytes);
@@ -40,7 +40,7 @@ TEST_P(EveryKind, ComesBackToTheBit) {
     EXPECT_EQ(again.world.movers[i].name, scene.world.movers[i].name);
 }
 
-INSTANTIATE_TEST_SUITE_P(SceneBytes, EveryKind, testing::ValuesIn(scene_kinds().begin(), scene_kinds().end()),
+INSTANTIATE_TEST_SUITE_P(EveryKind, BytesOfAScene, testing::ValuesIn(scene_kinds().begin(), scene_kinds().end()),
                          [](const auto& info) {
                            std::string name = info.param.name;
                            std::replace(name.begin(), name.end(), '-', '_');
