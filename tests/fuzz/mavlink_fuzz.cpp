@@ -202,7 +202,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   } else {
     const auto raw = in.rest();
     stream.assign(raw.begin(), raw.end());
-    wasp::Sink sink{1, {}};
+    wasp::Sink sink;
+    sink.received_at_ns = 1;
     wasp::drivers::AutopilotLink link;
     link.receive(stream, sink.received_at_ns, sink);
   }
