@@ -3,12 +3,13 @@
 #include <fmt/format.h>
 
 #include <numbers>
-#include <span>
 #include <sstream>
 #include <utility>
 
 #include "scheduling/default_config.h"
+#include "scheduling/imu_config.h"
 #include "scheduling/toml_durations.h"
+#include "scheduling/toml_vector.h"
 
 namespace wasp::scheduling {
 namespace {
@@ -40,13 +41,6 @@ void read_run(TomlTable t, Config& c) {
   t.flag("trace_switches", c.trace_switches);
   t.text_value("tracefs", c.tracefs);
   t.finish();
-}
-
-void read_vector(TomlTable& t, const char* key, std::span<float> out, double low, double high) {
-  std::vector<double> numbers;
-  t.numbers(key, numbers, low, high);
-  if (!numbers.empty() && numbers.size() != out.size()) t.refuse(fmt::format("'{}' needs {} numbers", key, out.size()));
-  for (std::size_t i = 0; i < numbers.size(); ++i) out[i] = static_cast<float>(numbers[i]);
 }
 
 /// Lens and mount of either camera. Angles are degrees in the file only.
@@ -247,6 +241,7 @@ void settle(Config& c) {
 void read_document(TomlTable root, Config& c, bool foreign_behaviours) {
   read_run(root.table("run"), c);
   read_autopilot(root.table("autopilot"), c.autopilot);
+  read_imu(root.table("imu"), c.imu);
   root.table("calibration");  // the evidence that `wasp calibrate` writes beside its values: for people
   read_camera(root.table("camera"), c);
   read_camera_down(root.table("camera_down"), c.camera_down);

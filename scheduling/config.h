@@ -6,6 +6,7 @@
 
 #include "control/control_step.h"
 #include "drivers/camera_driver.h"
+#include "drivers/imu_correction.h"
 #include "rt/periodic.h"
 #include "rt/thread.h"
 #include "scheduling/autopilot_config.h"
@@ -57,6 +58,8 @@ struct Config {
   bool trace_switches = true;
 
   AutopilotConfig autopilot;
+
+  drivers::ImuCorrection imu;  ///< applied by the link thread
 
   std::string camera_driver = "sim";
   drivers::CameraSettings camera_settings;  ///< of a real camera

@@ -262,6 +262,7 @@ class Flight {
     link_ = std::make_unique<LinkLoop>(flight_, port_, autopilot_, stages_, report_, link_events_,
                                        add_watch(config_.link_thread),
                                        config_.autopilot.wish(config_.control.limits.max_tilt_rad), link_services());
+    link_->correct(config_.imu);
     control.watch = &add_watch(config_.control_thread);
     control.guard = guard_ ? &guard_->block() : nullptr;
     if (faults_) control.hook = control_fault_hook(control_);

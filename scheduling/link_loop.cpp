@@ -246,6 +246,7 @@ void LinkLoop::on_imu(const ImuSample& received) WASP_REALTIME {
   ImuSample sample = received;
   if (!faults_.pass(sample, received_at_ns_)) return;
   if (!usable(imu_judge_.judge(sample, received_at_ns_), "imu refused: ", imu_told_)) return;
+  corrector_.apply(sample);
   imu_.write(sample, received_at_ns_);
   if (services_.telemetry != nullptr) services_.telemetry->note(sample);
   age_->record(received_at_ns_ - sample.exposed_at_ns);

@@ -7,6 +7,7 @@
 
 #include "drivers/autopilot_link.h"
 #include "drivers/autopilot_setup.h"
+#include "drivers/imu_correction.h"
 #include "drivers/line_port.h"
 #include "drivers/sample_judge.h"
 #include "rt/seqlock.h"
@@ -33,6 +34,8 @@ class LinkLoop {
   LinkLoop(const shm::Region& flight, drivers::LinePort& port, drivers::AutopilotLink& autopilot, StageTable& stages,
            rt::Seqlock<LinkReport>& report, EventQueue& events, ThreadWatch& watch, const drivers::SetupWish& wish = {},
            const LinkServices& services = {});
+  /// Before run: inertial samples reach the ring corrected so.
+  void correct(const drivers::ImuCorrection& correction) { corrector_ = drivers::ImuCorrector(correction); }
   /// Runs until the stop flag. Real-time loop.
   void run(LoopControl& control);
 
@@ -83,6 +86,7 @@ class LinkLoop {
   bool gone_ = false;
   bool heard_ = false;  ///< the autopilot itself spoke in the bytes at hand
   bool heartbeat_seen_ = false;
+  drivers::ImuCorrector corrector_;
   drivers::ImuJudge imu_judge_;
   drivers::AttitudeJudge attitude_judge_;
   Told imu_told_, attitude_told_, driver_;

@@ -164,19 +164,22 @@ TEST(CalibrateCamera, AViewOfAnotherCameraIsLeftOutAndSaid) {
   EXPECT_NE(notes.find("broken.png"), std::string::npos) << notes;
 }
 
-/// A camera of others, hand-held over a board for 0.8 s, beside the intrinsics they give.
-TEST(CalibrateCamera, RealBoardAgreesWithWhatItsOwnersFoundOrIsRefused) {
+/// A camera of others, hand-held over a board for 0.8 s, beside the intrinsics they give: all views look alike (11
+/// degrees of tilt), so that the bound of bias is wide.
+TEST(CalibrateCamera, RealBoardAgreesWithWhatItsOwnersFound) {
   const fs::path folder = fs::path(WASP_SOURCE_DIR) / "../shared/data/plane_checkerboard";
   if (!fs::exists(folder / "img_0181.png")) GTEST_SKIP() << "no ../shared/data/plane_checkerboard";
   ProgressBar bar("test");
-  try {
-    const Solution s = solve_camera(options(folder), bar);
-    for (const auto& [key, truth] :
-         {std::pair{"fx_px", 420.507}, {"fy_px", 420.611}, {"cx_px", 355.208}, {"cy_px", 250.337}})
-      EXPECT_NEAR(number(s.flight.at(0), key), truth, 3 * number(s.evidence, std::string(key) + "_sigma")) << key;
-  } catch (const Refusal& refusal) {
-    SUCCEED() << refusal.what();
+  const Solution s = solve_camera(options(folder), bar);
+  for (const auto& [key, truth] :
+       {std::pair{"fx_px", 420.507}, {"fy_px", 420.611}, {"cx_px", 355.208}, {"cy_px", 250.337}}) {
+    const std::string name = key;
+    EXPECT_NEAR(number(s.flight.at(0), name), truth,
+                3 * number(s.evidence, name + "_sigma") + number(s.evidence, name + "_bias"))
+        << key;
+    EXPECT_NEAR(number(s.flight.at(0), name), truth, 9) << key;  // two per cent
   }
+  EXPECT_LT(number(s.evidence, "held_out_rms_px"), 0.25);
 }
 
 }  // namespace

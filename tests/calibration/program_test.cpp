@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "calibration/calibrations.h"
+#include "scheduling/config.h"
 #include "tests/calibration/synthetic_sensor.h"
 #include "tests/tools/program.h"
 
@@ -28,13 +29,14 @@ fs::path rests(const fs::path& file, int count, bool all_over) {
   return file;
 }
 
-TEST(CalibrateProgram, WritesTomlAndPicture) {
+TEST(CalibrateProgram, WritesWhatAFlightTakes) {
   const test::TemporaryFolder folder;
   const auto csv = rests(folder.path / "rests.csv", 50, true);
   const auto out = folder.path / "deep" / "accel.toml";
   const auto [text, code] = test::run_shell(calibrate("accel " + csv.string() + " --rests --out " + out.string()));
   ASSERT_EQ(code, 0) << text;
   EXPECT_NE(text.find("100 %"), std::string::npos);  // the bar
+  EXPECT_NEAR(scheduling::load_config({out.string()}, {}).imu.accel.neutral[2], 0.3f, 0.02f);
   const std::string toml = test::read_text(out);
   for (const char* key :
        {"[calibration.accel]", "date = ", "source = ", "samples = 50", "residual_rms = ", "neutral_sigma = "})
