@@ -18,6 +18,7 @@ std::uint64_t SourceTable::add_good(std::uint8_t system_id, std::uint8_t compone
   const auto step = static_cast<std::uint8_t>(sequence - row->last_sequence);
   const std::uint32_t passed = row->unverified_since_good + 1;
   const std::uint64_t lost = first || step < passed ? 0 : step - passed;  // a repeated number is not a loss
+  if (!first && step == 0) ++row->repeated;
   row->last_sequence = sequence;
   row->unverified_since_good = 0;
   row->sequence_lost += lost;

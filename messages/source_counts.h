@@ -31,6 +31,7 @@ struct SourceCounts {
   std::uint64_t good = 0;
   std::uint64_t bad_crc = 0, unknown_id = 0, unsupported_flags = 0;  ///< as claimed by headers nobody could verify
   std::uint64_t sequence_lost = 0;
+  std::uint64_t repeated = 0;               ///< good frames with the number of the one before: sent twice, or echoed
   std::uint32_t unverified_since_good = 0;  ///< frames passed over since the last good one: not lost
 };
 

@@ -153,6 +153,8 @@ TEST(FrameParser, CountsSequenceGapsPerSource) {
   EXPECT_EQ(parser.sources()[0].sequence_lost, 4u);
   EXPECT_EQ(parser.sources()[1].sequence_lost, 0u);
   EXPECT_EQ(parser.sources()[0].good, 4u);
+  EXPECT_EQ(parser.sources()[0].repeated, 1u);
+  EXPECT_EQ(parser.sources()[1].repeated, 0u);
 }
 
 TEST(FrameParser, UnknownMessagesAreNotLost) {
