@@ -5,7 +5,7 @@
 //                                                        camera* only from wasp camera
 //   wasp.<instance>.relay    as .camera                  written by a flight process with fault points only: what its
 //                                                        behaviours see instead (scheduling/camera_relay.h)
-//   wasp.<instance>.flight   imu, attitude, flow, flow.down, cue.<behaviour>, command, stages, run
+//   wasp.<instance>.flight   imu, attitude, position, flow, flow.down, cue.<behaviour>, command, stages, run
 //                                                        written by the flight process; a flow ring only where a
 //                                                        behaviour makes it, a cue ring for every enabled behaviour
 //   wasp.<instance>.truth    truth                       written by the simulator; no flight thread reads it
@@ -30,6 +30,7 @@ inline constexpr const char* kFlow = "flow";           ///< type Flow: FlowMessa
 inline constexpr const char* kFlowDown = "flow.down";  ///< type Flow: of the camera that looks down
 inline constexpr const char* kImu = "imu";             ///< type Imu: ImuSample
 inline constexpr const char* kAttitude = "attitude";   ///< type Attitude: AttitudeSample
+inline constexpr const char* kPosition = "position";   ///< type Position: PositionSample, where the autopilot tells it
 inline constexpr const char* kCommand = "command";     ///< type Command
 inline constexpr const char* kTruth = "truth";         ///< type Truth
 inline constexpr const char* kStages = "stages";       ///< block, type StageTable: latency of every stage
@@ -39,6 +40,7 @@ inline constexpr std::uint32_t kFrameSlots = 8;  ///< 266 ms at 30 Hz
 inline constexpr std::uint32_t kFlowSlots = 16;  ///< more than twice what a replay lets lie unread (replay_camera.cpp)
 inline constexpr std::uint32_t kImuSlots = 512;  ///< 2.5 s at 200 Hz: history to match a frame against
 inline constexpr std::uint32_t kAttitudeSlots = 256;
+inline constexpr std::uint32_t kPositionSlots = 64;
 inline constexpr std::uint32_t kCueSlots = 64;
 inline constexpr std::uint32_t kCommandSlots = 64;
 inline constexpr std::uint32_t kTruthSlots = 512;

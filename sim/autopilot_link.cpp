@@ -48,12 +48,25 @@ bool setpoint_of(const mavlink::SetAttitudeTarget& target, Flavour flavour, Atti
   return true;
 }
 
-AutopilotLink::AutopilotLink(FlightController& flight, DurationNs clock_offset_ns)
-    : flight_(flight), clock_offset_ns_(clock_offset_ns), parameters_(flight.kind().flavour) {
+AutopilotLink::AutopilotLink(FlightController& flight, DurationNs clock_offset_ns, Chatter chatter)
+    : flight_(flight),
+      clock_offset_ns_(clock_offset_ns),
+      parameters_(flight.kind().flavour),
+      tells_events_(chatter == Chatter::kFull) {
+  const bool full = tells_events_, px4 = is(Flavour::kPx4), ardupilot = is(Flavour::kArduPilot);
+  streams_ = {{{mavlink::Heartbeat::kId, 200, 200},
+               {ardupilot ? mavlink::Attitude::kId : mavlink::AttitudeQuaternion::kId, ardupilot ? 50u : 2u, 0},
+               {ardupilot ? mavlink::RawImu::kId : mavlink::HighresImu::kId,
+                ardupilot ? 100u
+                : px4     ? 4u
+                          : 1u,
+                0},
+               {mavlink::LocalPositionNed::kId, 0, 0}}};
+  for (std::size_t i : {kAttitude, kImu})
+    if (!full) streams_[i].usual = 0;
+  for (Stream& stream : streams_) stream.every = stream.usual;
   output_.reserve(kMaxQueued);
   apply_parameters();
-  if (is(Flavour::kPx4)) imu_every_ = 4;
-  if (is(Flavour::kArduPilot)) imu_every_ = 100, attitude_every_ = 50;  // 2 Hz and 4 Hz until asked
 }
 
 void AutopilotLink::apply_parameters() {
@@ -108,7 +121,7 @@ CommandResult AutopilotLink::obey(const mavlink::CommandLong& command, TimeNs no
       clock_offset_ns_ += from_seconds(static_cast<double>(command.param1));
       return CommandResult::kAccepted;
     case kCommandInterval:
-      return set_interval(command);
+      return set_interval(command.param1, command.param2);
     default:
       return CommandResult::kUnsupported;
   }
@@ -122,23 +135,6 @@ CommandResult AutopilotLink::set_mode(float main_mode) {
     if (main_mode == static_cast<float>(number)) return flight_.set_mode(mode);
   }
   return main_mode >= 0 && main_mode < 256 ? CommandResult::kUnsupported : CommandResult::kDenied;  // NaN: denied
-}
-
-CommandResult AutopilotLink::set_interval(const mavlink::CommandLong& command) {
-  const bool possible = command.param2 >= 5000.f && command.param2 <= 1e6f;  // of 200 ticks a second
-  const auto ticks = possible ? static_cast<std::uint64_t>(command.param2 / 5000.f) : 0;
-  if (!possible) return CommandResult::kDenied;
-  const auto id = static_cast<std::uint32_t>(command.param1);
-  if (id == mavlink::Heartbeat::kId)
-    beat_every_ = ticks;
-  else if (is(Flavour::kPx4) ? id == mavlink::HighresImu::kId : is(Flavour::kArduPilot) && id == mavlink::RawImu::kId)
-    imu_every_ = ticks;
-  else if (is(Flavour::kPx4) ? id == mavlink::AttitudeQuaternion::kId
-                             : is(Flavour::kArduPilot) && id == mavlink::Attitude::kId)
-    attitude_every_ = ticks;
-  else
-    return CommandResult::kDenied;
-  return CommandResult::kAccepted;
 }
 
 CommandResult AutopilotLink::send_version(TimeNs) {
@@ -178,6 +174,29 @@ void AutopilotLink::on_parameter_set(const mavlink::ParamSet& request) {
   send_parameter(*row);
 }
 
+/// Of 200 ticks a second; -1 stops, 0 is the usual.
+CommandResult AutopilotLink::set_interval(float message, float interval_us) {
+  for (Stream& stream : streams_) {
+    if (message != static_cast<float>(stream.id)) continue;
+    if (interval_us == 0.f || interval_us == -1.f) {
+      stream.every = interval_us == 0.f ? stream.usual : 0;
+      return CommandResult::kAccepted;
+    }
+    if (!(interval_us >= 5000.f && interval_us <= 1e6f)) return CommandResult::kDenied;
+    stream.every = static_cast<std::uint64_t>(std::lround(interval_us / 5000.f));
+    return CommandResult::kAccepted;
+  }
+  return CommandResult::kDenied;
+}
+
+void AutopilotLink::share_reboot(const AutopilotLink& other) {
+  if (other.silent_until_ns_ <= silent_until_ns_) return;
+  silent_until_ns_ = other.silent_until_ns_;
+  clock_offset_ns_ = other.clock_offset_ns_;
+  ticks_ = 0;
+  for (Stream& stream : streams_) stream.every = stream.usual;
+}
+
 CommandResult AutopilotLink::reboot(const mavlink::CommandLong& command, TimeNs now_ns) {
   if (command.param1 != 1.f) return CommandResult::kUnsupported;
   if (flight_.armed() && command.param6 != kForceReboot) return CommandResult::kDenied;
@@ -189,6 +208,7 @@ CommandResult AutopilotLink::reboot(const mavlink::CommandLong& command, TimeNs 
   failures_ = SensorFailures();
   clock_offset_ns_ = -now_ns;
   ticks_ = 0;  // a heartbeat first
+  for (Stream& stream : streams_) stream.every = stream.usual;
   silent_until_ns_ = now_ns + kRebootTime;
   return CommandResult::kAccepted;
 }
@@ -232,16 +252,21 @@ void AutopilotLink::on_timesync(const mavlink::Timesync& sync, const mavlink::Fr
   send(reply);
 }
 
-void AutopilotLink::step(const ImuSample& imu, TimeNs now_ns) {
+void AutopilotLink::step(const ImuSample& imu, const LocalPosition& where, TimeNs now_ns) {
   if (now_ns < silent_until_ns_) return;
-  if (ticks_ % imu_every_ == 0) send_imu(imu, now_ns);
-  if (ticks_ % attitude_every_ == 0) send_attitude(now_ns);
-  if (ticks_ % beat_every_ == 0) send_heartbeat();
+  if (due(kImu)) send_imu(imu, now_ns);
+  if (due(kAttitude)) send_attitude(now_ns);
+  if (due(kPosition)) send_position(where, now_ns);
+  if (due(kBeat)) send_heartbeat();
   const std::uint64_t asks_every = is(Flavour::kPx4) ? kTicksPerSecond / 10 : kTicksPerSecond;
   if (ticks_ % asks_every == asks_every / 2) {
     mavlink::Timesync request{};
     request.ts1 = own_time(now_ns);
     send(request);
+  }
+  if (!tells_events_) {
+    ++ticks_;
+    return;
   }
   if (const std::string_view event = flight_.take_event(); !event.empty()) {
     send_text(event, flight_.descending() ? 2 : 6);
@@ -298,6 +323,14 @@ void AutopilotLink::send_imu(const ImuSample& imu, TimeNs now_ns) {
   m.pressure_alt = flight_.barometric_height_m();
   m.temperature = imu.temperature_degc;
   m.fields_updated = static_cast<std::uint16_t>(imu.fields);
+  send(m);
+}
+
+void AutopilotLink::send_position(const LocalPosition& where, TimeNs now_ns) {
+  mavlink::LocalPositionNed m{};
+  m.time_boot_ms = static_cast<std::uint32_t>(own_time(now_ns) / kMillisecond);
+  m.x = where.position_ned_m[0], m.y = where.position_ned_m[1], m.z = where.position_ned_m[2];
+  m.vx = where.velocity_ned_mps[0], m.vy = where.velocity_ned_mps[1], m.vz = where.velocity_ned_mps[2];
   send(m);
 }
 

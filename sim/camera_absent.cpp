@@ -12,6 +12,7 @@ CameraPart::CameraPart(const SimConfig&, const std::string&) {
 }
 CameraPart::~CameraPart() = default;
 void CameraPart::start(TimeNs, PoseQueue&, const std::atomic<bool>&) {}
+void CameraPart::start(TimeNs, FollowedPose&, const std::atomic<bool>&) {}
 void CameraPart::join() {}
 std::string CameraPart::summary() const { return {}; }
 

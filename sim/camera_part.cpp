@@ -7,6 +7,7 @@
 #include "rt/thread.h"
 #include "shm/topics.h"
 #include "sim/camera_loop.h"
+#include "sim/follow_loop.h"
 #include "sim/owned_region.h"
 
 namespace wasp::sim {
@@ -42,6 +43,11 @@ struct CameraPart::Parts {
   std::unique_ptr<SimCamera> down;  ///< nullptr: there is none
   OwnedRegion frames;
   std::optional<CameraLoop> loop;
+  std::optional<FollowLoop> following;  ///< instead
+
+  [[nodiscard]] std::optional<CameraView> down_view() {
+    return down ? std::optional(CameraView{down.get(), down_rate_hz}) : std::nullopt;
+  }
   rt::Thread thread;  // joined first
 };
 
@@ -51,19 +57,25 @@ CameraPart::CameraPart(const SimConfig& config, const std::string& instance)
 CameraPart::~CameraPart() = default;
 
 void CameraPart::start(TimeNs start_ns, PoseQueue& poses, const std::atomic<bool>& stop) {
-  std::optional<CameraView> down;
-  if (parts_->down) down = CameraView{parts_->down.get(), parts_->down_rate_hz};
-  CameraLoop& loop = parts_->loop.emplace(CameraView{&parts_->front, parts_->front_rate_hz}, down, start_ns,
-                                          parts_->frames.region, poses);
+  CameraLoop& loop = parts_->loop.emplace(CameraView{&parts_->front, parts_->front_rate_hz}, parts_->down_view(),
+                                          start_ns, parts_->frames.region, poses);
+  parts_->thread = rt::Thread({.name = "camera", .core = rt::nearest_usable_core(0)}, [&] { loop.run(stop); });
+}
+
+void CameraPart::start(TimeNs start_ns, FollowedPose& pose, const std::atomic<bool>& stop) {
+  FollowLoop& loop = parts_->following.emplace(CameraView{&parts_->front, parts_->front_rate_hz}, parts_->down_view(),
+                                               start_ns, parts_->frames.region, pose);
   parts_->thread = rt::Thread({.name = "camera", .core = rt::nearest_usable_core(0)}, [&] { loop.run(stop); });
 }
 
 void CameraPart::join() { parts_->thread.join(); }
 
 std::string CameraPart::summary() const {
-  const CameraLoop& loop = *parts_->loop;
-  const std::string text = account_of(loop.front());
-  return loop.down() == nullptr ? text : text + "; down: " + account_of(*loop.down());
+  const auto text_of = [](const auto& loop) {
+    const std::string text = account_of(loop.front());
+    return loop.down() == nullptr ? text : text + "; down: " + account_of(*loop.down());
+  };
+  return parts_->following ? text_of(*parts_->following) : text_of(*parts_->loop);
 }
 
 }  // namespace wasp::sim

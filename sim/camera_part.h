@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 
+#include "sim/followed_pose.h"
 #include "sim/sim_config.h"
 #include "sim/vehicle_loop.h"
 
@@ -21,6 +22,8 @@ class CameraPart {
 
   /// Starts the thread: exposures on a grid from `start_ns`, until `stop`.
   void start(TimeNs start_ns, PoseQueue& poses, const std::atomic<bool>& stop);
+  /// The same for a vehicle that somebody else flies: exposures wait until their pose is known.
+  void start(TimeNs start_ns, FollowedPose& pose, const std::atomic<bool>& stop);
   void join();
   /// After join: frames made and missed, time to render. For people.
   [[nodiscard]] std::string summary() const;

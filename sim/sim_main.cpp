@@ -8,12 +8,14 @@
 #include <optional>
 #include <stdexcept>
 #include <system_error>
+#include <vector>
 
 #include "rt/thread.h"
 #include "shm/region.h"
 #include "shm/topics.h"
 #include "sim/camera_part.h"
 #include "sim/owned_region.h"
+#include "sim/pose_feed.h"
 #include "sim/pty.h"
 #include "sim/truth_feed.h"
 #include "sim/udp_line.h"
@@ -25,13 +27,43 @@ using namespace wasp;
 using namespace wasp::sim;
 
 struct Options {
-  std::string instance = "wasp", tty_link, udp, config_path, world_kind, world_file, autopilot;
+  std::string instance = "wasp", tty_link, second_link, udp, config_path, world_kind, world_file, autopilot;
   std::vector<std::string> parameters;
   std::optional<std::uint32_t> seed;
   std::optional<double> rate_hz;
   bool no_camera = false, camera_only = false, no_safety_pilot = false;
   double seconds = 0;
+  std::string follow;
+  PoseLinkParams follow_link{.rate_hz = 0};
+  double follow_delay_ms = 0;
+  bool follow_heading = false;
+  std::vector<float> follow_origin;
 };
+
+void declare_follow(CLI::App& app, Options& o) {
+  auto* follow = app.add_option(
+      "--follow", o.follow,
+      "the camera alone, looking from the vehicle of another autopilot (a real one, ArduPilot's or PX4's simulator): "
+      "an endpoint where it speaks MAVLink (serial:DEVICE:BAUD, udp://OWN:PORT, udpout://HOST:PORT, tcp://HOST:PORT), "
+      "or `flight`, which takes its pose from the flight of the same instance. Each frame is drawn when the poses "
+      "on both sides of its exposure are known, never ahead of them");
+  app.add_option("--follow-system", o.follow_link.system_id, "system id of the autopilot")->capture_default_str();
+  app.add_option("--follow-component", o.follow_link.component_id, "our component id there")->capture_default_str();
+  app.add_option("--follow-rate", o.follow_link.rate_hz,
+                 "attitudes and positions asked for [Hz]; without it 50 on a serial line, 100 on a socket")
+      ->check(CLI::Range(4.0, 200.0));
+  app.add_option("--follow-delay-ms", o.follow_delay_ms,
+                 "draw so long after the exposure; 0: as the poses come, and 3 ms")
+      ->check(CLI::Range(0.0, 700.0))
+      ->capture_default_str();
+  app.add_flag("--follow-heading", o.follow_heading,
+               "keep the autopilot's heading; without it what it faces before arming is the world's north");
+  app.add_option("--follow-origin", o.follow_origin,
+                 "north east down [m] in the autopilot's local frame of the point on the ground that is the world's "
+                 "start; without it, where it is armed")
+      ->expected(3);
+  for (const char* other : {"--no-camera", "--camera-only", "--tty-link", "--second-link"}) follow->excludes(other);
+}
 
 void declare(CLI::App& app, Options& o) {
   app.add_option("--instance", o.instance, "name of the shared memory regions: wasp.NAME.camera, wasp.NAME.truth")
@@ -44,6 +76,8 @@ void declare(CLI::App& app, Options& o) {
   app.add_option("--autopilot", o.autopilot, "whose autopilot to behave as (default: autopilot.flavour)")
       ->check(CLI::IsMember({"wasp", "px4", "ardupilot"}));
   app.add_option("--param", o.parameters, "NAME=VALUE: a parameter of the autopilot (px4, ardupilot); may be repeated");
+  app.add_option("--second-link", o.second_link,
+                 "symbolic link to make to a second serial port of the autopilot, which sends what it is asked for");
   app.add_option("--config", o.config_path, "TOML file; see share/wasp/config/sim.toml for every key");
   app.add_option("--world", o.world_file, "VRML97 file to fly in (`wasp world make`); default: world.kind")
       ->check(CLI::ExistingFile);
@@ -66,6 +100,7 @@ void declare(CLI::App& app, Options& o) {
   app.add_option("--seconds", o.seconds, "end after this time; 0: run until SIGINT or SIGTERM")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
+  declare_follow(app, o);
 }
 
 SimConfig settings(const Options& o) {
@@ -129,6 +164,46 @@ std::unique_ptr<CompanionLine> open_line(const Options& options) {
   return std::make_unique<Pty>(options.tty_link);
 }
 
+FollowParams follow_params(const Options& o, const SimConfig& config) {
+  FollowParams params;
+  params.delay_ns = from_seconds(o.follow_delay_ms * 1e-3);
+  params.placement.standing_m = static_cast<float>(config.vehicle.leg_m);
+  params.placement.keep_heading = o.follow_heading;
+  if (o.follow_origin.size() == 3)
+    params.placement.origin_ned_m = Vec3(o.follow_origin[0], o.follow_origin[1], o.follow_origin[2]);
+  return params;
+}
+
+void print_texts(FollowedPose& pose) {
+  for (const auto& text : pose.take_texts()) std::printf("wasp-sim: %s\n", text.c_str());
+  std::fflush(stdout);
+}
+
+/// The camera of a vehicle that somebody else flies.
+void run_follow(const Options& options, const sigset_t& signals) {
+  const SimConfig config = settings(options);
+  FollowedPose pose(follow_params(options, config));
+  PoseLinkParams link = options.follow_link;
+  if (link.rate_hz <= 0) link.rate_hz = options.follow.starts_with("serial:") ? 50 : 100;
+  const auto feed = make_pose_feed(options.follow, options.instance, link, pose);
+  CameraPart camera(config, options.instance);
+  std::atomic<bool> stop{false};
+  rt::Thread feed_thread({.name = "follow", .core = rt::nearest_usable_core(0)}, [&] { feed->run(stop); });
+  camera.start(rt::now() + 10 * kMillisecond, pose, stop);
+  std::printf("wasp-sim: instance %s, camera only, following %s\n", options.instance.c_str(), options.follow.c_str());
+  const TimeNs end_ns = options.seconds > 0 ? rt::now() + from_seconds(options.seconds) : INT64_MAX;
+  while (rt::now() < end_ns) {
+    print_texts(pose);
+    const timespec turn = rt::to_timespec(100 * kMillisecond);
+    if (sigtimedwait(&signals, nullptr, &turn) > 0) break;
+  }
+  stop.store(true);
+  camera.join();
+  feed_thread.join();
+  print_texts(pose);
+  std::printf("wasp-sim: %s\n", camera.summary().c_str());
+}
+
 void run(const Options& options, const sigset_t& signals) {
   const SimConfig config = settings(options);
   std::optional<CameraPart> camera;
@@ -136,10 +211,12 @@ void run(const Options& options, const sigset_t& signals) {
   const shm::TopicSpec truth_topic{shm::kTruth, "Truth", shm::TopicKind::kRing, shm::kTruthSlots, sizeof(Truth)};
   const OwnedRegion truth(shm::truth_region(options.instance), {&truth_topic, 1});
   const std::unique_ptr<CompanionLine> line = open_line(options);
+  std::optional<Pty> second;
+  if (!options.second_link.empty()) second.emplace(options.second_link);
 
   const TimeNs start_ns = rt::now() + 10 * kMillisecond;
   auto poses = std::make_unique<PoseQueue>();
-  VehicleLoop vehicle_loop(config, start_ns, *line, truth.region, *poses);
+  VehicleLoop vehicle_loop(config, start_ns, *line, truth.region, *poses, second ? &*second : nullptr);
   std::atomic<bool> stop{false};
   rt::Thread vehicle_thread = start_vehicle([&] { vehicle_loop.run(stop); });
   if (camera) camera->start(start_ns, *poses, stop);
@@ -168,7 +245,9 @@ int main(int argc, char** argv) {
   sigaddset(&signals, SIGTERM);
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
   try {
-    if (options.camera_only) {
+    if (!options.follow.empty()) {
+      run_follow(options, signals);
+    } else if (options.camera_only) {
       run_camera(options, signals);
     } else {
       if (options.tty_link.empty() && options.udp.empty()) throw std::runtime_error("--tty-link or --udp is required");

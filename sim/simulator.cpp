@@ -19,6 +19,7 @@ Simulator::Simulator(const SimConfig& config, TimeNs start_ns)
       imu_(config.imu, mix(config.seed, 1)),
       flight_(config.vehicle, kind_of(config.flavour)),
       link_(flight_, from_seconds(config.clock_offset_s)),
+      second_(flight_, from_seconds(config.clock_offset_s), Chatter::kHeartbeat),
       pilot_(config.safety_pilot && !config.stand.turntable, config.pilot),
       start_ns_(start_ns),
       now_ns_(start_ns) {
@@ -55,7 +56,11 @@ void Simulator::control_tick() {
   const PilotTrim trim = pilot_.step(state, commanded, flight_.armed() && !state.on_ground);
   flight_.set_trim(trim.roll_rad, trim.pitch_rad, trim.yaw_rate_radps);
   wanted_radps_ = flight_.step(imu, state.on_ground, now_ns_);
-  link_.step(imu, now_ns_);
+  const LocalPosition where{to_floats(state.position_ned_m), to_floats(state.velocity_ned_mps)};
+  second_.share_reboot(link_);
+  link_.share_reboot(second_);
+  link_.step(imu, where, now_ns_);
+  second_.step(imu, where, now_ns_);
 }
 
 double Simulator::flight_time_s() const { return took_off_ns_ == kNever ? 0 : to_seconds(now_ns_ - took_off_ns_); }

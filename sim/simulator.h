@@ -35,6 +35,11 @@ class Simulator {
   void from_companion(std::span<const std::uint8_t> bytes, TimeNs heard_at_ns) { link_.receive(bytes, heard_at_ns); }
   /// Moves the bytes the autopilot has written to the end of `out`.
   void drain(std::vector<std::uint8_t>& out) { link_.drain(out); }
+  /// The same of the autopilot's second port, which sends its heartbeat and what it is asked for.
+  void from_second_port(std::span<const std::uint8_t> bytes, TimeNs heard_at_ns) {
+    second_.receive(bytes, heard_at_ns);
+  }
+  void drain_second_port(std::vector<std::uint8_t>& out) { second_.drain(out); }
 
   [[nodiscard]] Truth truth() const;
   [[nodiscard]] BodyPose pose() const;
@@ -54,7 +59,7 @@ class Simulator {
   Wind wind_;
   ImuModel imu_;
   FlightController flight_;
-  AutopilotLink link_;
+  AutopilotLink link_, second_;
   SafetyPilot pilot_;
   std::array<double, 4> wanted_radps_{};
   TimeNs start_ns_, now_ns_, took_off_ns_ = kNever;

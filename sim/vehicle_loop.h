@@ -18,8 +18,9 @@ using PoseQueue = rt::SpscQueue<BodyPose, 256>;
 
 class VehicleLoop {
  public:
+  /// `second`: the autopilot's second port, may be nullptr.
   VehicleLoop(const SimConfig& config, TimeNs start_ns, CompanionLine& line, const shm::Region& truth_region,
-              PoseQueue& poses);
+              PoseQueue& poses, CompanionLine* second = nullptr);
 
   /// Runs until `stop`. Call from one thread.
   void run(const std::atomic<bool>& stop);
@@ -29,10 +30,12 @@ class VehicleLoop {
   void tick();
   void hear();
   void speak();
+  void serve_second();
 
   Simulator simulator_;
   TimeNs next_ns_;
   CompanionLine& line_;
+  CompanionLine* second_;
   shm::RingWriter truth_;
   PoseQueue& poses_;
   std::vector<std::uint8_t> output_;
