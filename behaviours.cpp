@@ -7,6 +7,7 @@
 #include "vision/flow_balance.h"
 #include "vision/flow_field.h"
 #include "vision/ground_altitude.h"
+#include "vision/ground_flow.h"
 #include "vision/heading_log_polar.h"
 #include "vision/heading_rate.h"
 #include "vision/landing.h"
@@ -37,6 +38,7 @@ const scheduling::BehaviourTable& all_behaviours() {
       behaviour_row<vision::Speed>(),
       behaviour_row<vision::Landing>(),
       behaviour_row<vision::EmdFlow>(),
+      behaviour_row<vision::GroundFlow>(),
   };
   return kBehaviours;
 }

@@ -9,7 +9,9 @@
 #include "sim/scene.h"
 #include "sim/sensor_model.h"
 #include "vision/flow_field.h"
+#include "vision/ground_flow.h"
 #include "vision/heading_rate.h"
+#include "vision/kernels/obstacle_bins.h"
 #include "vision/odometry.h"
 #include "vision/time_to_contact.h"
 
@@ -111,12 +113,22 @@ TEST(FlowInWorlds, OdometryMeasuresVelocityInTheCorridor) {
   }
 }
 
-/// How far north of the start the wall stands; it is the last face of its world.
-float wall_ahead_m(std::uint32_t seed) {
-  const World world = placed_at_start(make_scene("wall", seed));
-  const Vec3 normal = world.surfaces.back().normal, corner = world.vertices_ned_m[world.quads.back()[0]];
-  return normal.dot(corner) / normal.x();
-}
+/// The wall, the last face of its world.
+struct Wall {
+  Vec3 normal, corner_m;
+  explicit Wall(std::uint32_t seed) {
+    const World world = placed_at_start(make_scene("wall", seed));
+    normal = world.surfaces.back().normal;
+    corner_m = world.vertices_ned_m[world.quads.back()[0]];
+  }
+  /// From a place to the wall's plane along a level direction.
+  [[nodiscard]] float distance_m(const Vec3& from_m, float azimuth_rad) const {
+    return normal.dot(corner_m - from_m) / normal.dot(Vec3(std::cos(azimuth_rad), std::sin(azimuth_rad), 0));
+  }
+};
+
+/// How far north of the start the wall stands.
+float wall_ahead_m(std::uint32_t seed) { return Wall(seed).distance_m(Vec3::Zero(), 0); }
 
 TEST(FlowInWorlds, AvoidIsRaisedFifteenFramesBeforeAWall) {
   const CameraGeometry camera = camera_of(1.4f, 0.2);
@@ -172,6 +184,121 @@ TEST(FlowInWorlds, HeadingRateFollowsTheTurnOverTheLaboratoryFloor) {
   }
   EXPECT_LT(std::sqrt(squares / 39.f), 0.05f);
   EXPECT_NEAR(static_cast<float>(state.heading_rad), 0.5f * 39.f * kFrame_s, 0.01f);
+}
+
+/// Angle by which the point of level ground straight below the body turns past it, rotation and translation together,
+/// from true poses; x about the body's x axis, y about its y axis.
+struct TrueFlow {
+  float x_rad = 0, y_rad = 0;
+};
+TrueFlow true_flow(const Vec3& from_m, const Quat& from, const Vec3& to_m, const Quat& to, const Vec3& camera_body_m) {
+  const Vec3 a = from_m + from * camera_body_m, b = to_m + to * camera_body_m;
+  const Vec3 turn = Eigen::AngleAxisf(from.conjugate() * to).axis() * Eigen::AngleAxisf(from.conjugate() * to).angle();
+  const Vec3 way_body = to.conjugate() * (b - a);
+  const float along_m = -b.z() / (to * Vec3::UnitZ()).z();  // to the ground, down the body's own axis
+  return {turn.x() - way_body.y() / along_m, turn.y() + way_body.x() / along_m};
+}
+
+// The OPTICAL_FLOW_RAD that an autopilot is told, over a second at a time, against the true motion.
+TEST(FlowInWorlds, TheGroundFlowOfOpticalFlowRadIsTheTrueOne) {
+  const CameraGeometry camera = camera_of(1.5f, 1.5707963);
+  GroundFlow::Params params;
+  params.camera = camera;
+  float worst = 0, worst_still = 0;
+  for (const std::uint32_t seed : {1u, 2u}) {
+    Eye<FlowFieldDown> eye("laboratory", seed, camera);
+    GroundFlow::State state;
+    Vec3 last_m = Vec3::Zero();
+    Quat last = Quat::Identity();
+    for (int second = 0; second < 4; ++second) {
+      TrueFlow truth, told, turned;
+      for (int i = 0; i < 30; ++i) {
+        const float t_s = static_cast<float>(30 * second + i) * kFrame_s;
+        Euler attitude = wobble(t_s);
+        attitude.yaw_rad = 0.4f * t_s;
+        const Vec3 place_m(0.4f * std::sin(0.9f * t_s), -0.3f * t_s, -1.f - 0.15f * std::sin(t_s));
+        const Quat q = quat_from_euler(attitude);
+        const BehaviourInput in = eye.look(place_m, attitude);
+        const CueBody cue = GroundFlow::step(params, in, state);
+        const bool first = second == 0 && i == 0;
+        ASSERT_EQ(cue.validity == Validity::kValid, !first) << second << ' ' << i;
+        if (!first) {
+          const TrueFlow step = true_flow(last_m, last, place_m, q, camera.position_body_m);
+          truth.x_rad += step.x_rad, truth.y_rad += step.y_rad;
+          told.x_rad += cue.detail[GroundFlow::kFlowX_rad], told.y_rad += cue.detail[GroundFlow::kFlowY_rad];
+          turned.x_rad += cue.detail[GroundFlow::kTurnX_rad], turned.y_rad += cue.detail[GroundFlow::kTurnY_rad];
+        }
+        last_m = place_m, last = q;
+      }
+      const float error = std::hypot(told.x_rad - truth.x_rad, told.y_rad - truth.y_rad);
+      const float still = std::hypot(truth.x_rad - turned.x_rad, truth.y_rad - turned.y_rad);
+      std::printf("seed %u, second %d: told %+.4f %+.4f rad, true %+.4f %+.4f, of which the way %.4f: error %.4f\n",
+                  seed, second, static_cast<double>(told.x_rad), static_cast<double>(told.y_rad),
+                  static_cast<double>(truth.x_rad), static_cast<double>(truth.y_rad), static_cast<double>(still),
+                  static_cast<double>(error));
+      worst = std::max(worst, error / still);
+      worst_still = std::max(worst_still, error);
+    }
+  }
+  std::printf("worst error: %.1f %% of the way over height in a second\n", 100 * static_cast<double>(worst));
+  EXPECT_LT(worst, 0.05f);
+}
+
+// Signs alone, each motion by itself.
+TEST(FlowInWorlds, GroundFlowHasTheSignsOfTheProtocol) {
+  const CameraGeometry camera = camera_of(1.5f, 1.5707963);
+  GroundFlow::Params params;
+  params.camera = camera;
+  const auto flow_of = [&](const Vec3& way_m, const Euler& turn) {
+    Eye<FlowFieldDown> eye("laboratory", 1, camera);
+    GroundFlow::State state;
+    eye.look(Vec3(0, 0, -1), {});
+    const CueBody cue = GroundFlow::step(params, eye.look(Vec3(0, 0, -1) + way_m, turn), state);
+    EXPECT_EQ(cue.validity, Validity::kValid);
+    return std::pair(cue.detail[GroundFlow::kFlowX_rad], cue.detail[GroundFlow::kFlowY_rad]);
+  };
+  const float way = 0.02f, turn = 0.02f, rest = 0.002f;
+  EXPECT_NEAR(flow_of({way, 0, 0}, {}).second, way, rest);  // along +X: positive y
+  EXPECT_NEAR(flow_of({way, 0, 0}, {}).first, 0, rest);
+  EXPECT_NEAR(flow_of({0, way, 0}, {}).first, -way, rest);  // along +Y: negative x
+  EXPECT_NEAR(flow_of({0, 0, 0}, {turn, 0, 0}).first, turn, rest);
+  EXPECT_NEAR(flow_of({0, 0, 0}, {0, turn, 0}).second, turn * (1 - 0.05f),
+              rest);  // the camera 5 cm ahead rises with it
+}
+
+// OBSTACLE_DISTANCE before a wall: each bin the camera sees against the true distance to that wall.
+TEST(FlowInWorlds, ObstacleBinsAreTheTrueDistances) {
+  const CameraGeometry camera = camera_of(1.4f, 0.1);
+  ObstacleBinsParams params;
+  params.camera = camera;
+  float worst = 0;
+  for (const std::uint32_t seed : {1u, 2u}) {
+    const Wall wall(seed);
+    Eye<FlowFieldFront> eye("wall", seed, camera);
+    for (const float ahead_m : {1.f, 2.f, 3.f}) {
+      const float wall_m = wall.distance_m(Vec3::Zero(), 0);
+      const float north_m = wall_m - ahead_m - camera.position_body_m.x();
+      eye.look(Vec3(north_m, 0, -1), {});
+      const BehaviourInput in = eye.look(Vec3(north_m, 0, -1), {0.02f, 0, 0});
+      ASSERT_NE(in.flow, nullptr);
+      const ObstacleBins bins = obstacle_bins(params, *in.flow);
+      ASSERT_TRUE(bins.valid);
+      int seen = 0;
+      for (int bin = -7; bin <= 7; ++bin) {
+        const auto told_cm = bins.distance_cm[static_cast<std::size_t>((bin + 72) % 72)];
+        if (told_cm == kBinUnknown || told_cm > 400) continue;
+        const float azimuth = static_cast<float>(bin) * 5 * static_cast<float>(M_PI) / 180;
+        const float truth_m = wall.distance_m(Vec3(wall_m - ahead_m, 0, -1), azimuth);
+        const float error_m = std::abs(0.01f * told_cm - truth_m);
+        worst = std::max(worst, error_m / truth_m);
+        EXPECT_LT(error_m, 0.01f + 0.06f * truth_m) << "bin " << bin << " of a wall at " << ahead_m;
+        ++seen;
+      }
+      EXPECT_GE(seen, 11) << ahead_m;
+      for (int bin = 10; bin <= 62; ++bin) EXPECT_EQ(bins.distance_cm[static_cast<std::size_t>(bin)], kBinUnknown);
+    }
+  }
+  std::printf("obstacle bins: worst error %.1f %% of the distance\n", 100 * static_cast<double>(worst));
 }
 
 }  // namespace
