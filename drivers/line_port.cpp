@@ -13,6 +13,7 @@
 #include <system_error>
 #include <utility>
 
+#include "drivers/line_advice.h"
 #include "drivers/line_handover.h"
 #include "drivers/serial_line.h"
 #include "drivers/socket_line.h"
@@ -31,7 +32,9 @@ std::string name_of(const Endpoint& endpoint) {
 
 LinePort::LinePort(Endpoint endpoint) : endpoint_(std::move(endpoint)) {
   const int device = open_device();
-  if (device < 0) throw std::runtime_error(name_of(endpoint_) + ": " + std::generic_category().message(last_error_));
+  if (device < 0)
+    throw std::runtime_error(name_of(endpoint_) + ": " + std::generic_category().message(last_error_) +
+                             line_advice(endpoint_, last_error_));
   nothing_fd_ = ::open("/", O_PATH | O_CLOEXEC);
   fd_ = device;
 }
