@@ -247,6 +247,7 @@ void read_document(TomlTable root, Config& c, bool foreign_behaviours) {
   read_mission(root.table("mission"), c);
   read_control(root.table("control"), c);
   read_threads(root.table("threads"), c);
+  read_telemetry(root.table("telemetry"), c.telemetry);
   read_guardian(root.table("guardian"), c.guardian);
   read_behaviours(root.table("behaviour"), c, foreign_behaviours);
   root.finish();

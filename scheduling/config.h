@@ -10,6 +10,7 @@
 #include "rt/thread.h"
 #include "scheduling/autopilot_config.h"
 #include "scheduling/guard_config.h"
+#include "scheduling/telemetry_config.h"
 #include "scheduling/toml_table.h"
 #include "types/camera.h"
 
@@ -71,6 +72,7 @@ struct Config {
   FailsafeChoice failsafe = FailsafeChoice::kByFlavour;  ///< control.failsafe_action follows from it
   float patience_s = 0;                                  ///< as configured; control.mission.patience_s follows from it
 
+  TelemetryConfig telemetry;
   GuardConfig guardian;  ///< checked here, obeyed by `wasp guard`
 
   ThreadRow control_thread{"control", 1, 80, 2 * kMillisecond};

@@ -13,8 +13,10 @@
 #include "rt/thread.h"
 #include "scheduling/arming.h"
 #include "scheduling/camera_relay.h"
+#include "scheduling/computer_status.h"
 #include "scheduling/control_faults.h"
 #include "scheduling/control_loop.h"
+#include "scheduling/event_severity.h"
 #include "scheduling/fault_control.h"
 #include "scheduling/flight_end.h"
 #include "scheduling/flight_options.h"
@@ -29,6 +31,7 @@
 namespace wasp::scheduling {
 namespace {
 
+constexpr double kBitsPerByte = 10, kSocket_Bps = 20'000;
 constexpr double kReplayTail_s = 0.3;  // the last frames' cues reach a command before the replay ends
 
 void log_at(TimeNs at_ns, const char* text) { std::fprintf(stderr, "%10.3f  %s\n", to_seconds(at_ns), text); }
@@ -180,13 +183,18 @@ class Flight {
                                            add_watch(config_.camera_thread));
   }
 
-  /// Refuses a camera that does not offer what an enabled behaviour looks at.
+  /// Refuses a camera that does not offer what an enabled behaviour looks at, or shows it at another size than the
+  /// configuration says.
   void check_camera() const {
     for (std::size_t i = 0; i < table_.size(); ++i) {
       const BehaviourRow& row = table_[i];
-      if (config_.behaviours[i].enabled && !is_flow(row.stream) && !camera_->has(ring_of(row.stream)))
+      if (!config_.behaviours[i].enabled || is_flow(row.stream)) continue;
+      if (!camera_->has(ring_of(row.stream)))
         throw std::runtime_error("behaviour '" + row.name + "' is enabled, but the camera offers no '" +
                                  ring_of(row.stream) + "': set [behaviour." + row.name + "] enabled = false");
+      check_frame_size(*camera_, ring_of(row.stream),
+                       (looks_down(row.stream) ? config_.camera_down.geometry : config_.camera).intrinsics,
+                       looks_down(row.stream) ? "camera_down" : "camera");
     }
   }
 
@@ -218,14 +226,36 @@ class Flight {
     ControlWiring control{&flight_, &stages_, &report_, &port_, &autopilot_, &control_events_};
     for (std::size_t i = 0; i < table_.size(); ++i)
       control.behaviour_watches.push_back(config_.behaviours[i].enabled ? wire_behaviour(i) : nullptr);
+    telemetry_ = std::make_unique<Telemetry>(config_, flight_, autopilot_);
     link_ = std::make_unique<LinkLoop>(flight_, port_, autopilot_, stages_, report_, link_events_,
                                        add_watch(config_.link_thread),
-                                       config_.autopilot.wish(config_.control.limits.max_tilt_rad));
+                                       config_.autopilot.wish(config_.control.limits.max_tilt_rad), link_services());
     control.watch = &add_watch(config_.control_thread);
     control.guard = guard_ ? &guard_->block() : nullptr;
     if (faults_) control.hook = control_fault_hook(control_);
     control_loop_ = std::make_unique<ControlLoop>(config_, control);
-    supervisor_ = std::make_unique<Supervisor>(board_, *control_.status, supervisor_options(), log);
+    supervisor_ = std::make_unique<Supervisor>(board_, *control_.status, supervisor_options(),
+                                               [this](const std::string& text) { log_and_tell(text); });
+  }
+
+  LinkServices link_services() {
+    const drivers::Endpoint& endpoint = port_.endpoint();
+    const bool serial = endpoint.kind == drivers::EndpointKind::kSerial;
+    LinkServices services;
+    services.telemetry = telemetry_.get();
+    services.gate.bytes_per_s = serial ? endpoint.baud / kBitsPerByte : 0;
+    services.gate.budget_Bps = config_.telemetry.budget_Bps;
+    if (services.gate.budget_Bps <= 0) services.gate.budget_Bps = serial ? services.gate.bytes_per_s / 4 : kSocket_Bps;
+    services.control_period_ns = config_.control_period_ns;
+    if (config_.telemetry.position_hz > 0)
+      services.position_period_ns = from_seconds(1 / config_.telemetry.position_hz);
+    return services;
+  }
+
+  /// What the supervisor finds is a fault: the ground station hears of it.
+  void log_and_tell(const std::string& text) {
+    log(text);
+    telemetry_->inbox().tell(mavlink::mav_severity::kWarning, text);
   }
 
   /// Builds the adaptor of an enabled behaviour.
@@ -297,7 +327,10 @@ class Flight {
   void drain_events() {
     Event e;
     for (EventQueue* queue : {&control_events_, &link_events_, &relay_events_})
-      while (queue->take(e)) log_at(e.at_ns, e.text.data());  // when it was said, not when it is printed
+      while (queue->take(e)) {
+        log_at(e.at_ns, e.text.data());  // when it was said, not when it is printed
+        if (const auto severity = severity_of(e.text.data())) telemetry_->inbox().tell(*severity, e.text.data());
+      }
   }
 
   void supervise(const sigset_t& signals) {
@@ -309,6 +342,7 @@ class Flight {
       }
       drain_events();
       supervisor_->look();
+      look_at_computer();
     }
     control_.stop = true;
     if (faults_) faults_->stop();
@@ -318,6 +352,13 @@ class Flight {
     if (const std::uint64_t lost = control_events_.dropped() + link_events_.dropped() + relay_events_.dropped();
         lost > 0)
       log(std::to_string(lost) + " events were lost: their queue was full");
+  }
+
+  void look_at_computer() {
+    const TimeNs now_ns = rt::now();
+    if (now_ns - computer_at_ns_ < kSecond) return;
+    computer_at_ns_ = now_ns;
+    telemetry_->inbox().computer.store(computer_.look(now_ns));
   }
 
   const BehaviourTable& table_;
@@ -341,6 +382,9 @@ class Flight {
   rt::Seqlock<LinkReport> report_;
   EventQueue control_events_, link_events_, relay_events_;
   LoopControl control_;
+  std::unique_ptr<Telemetry> telemetry_;
+  ComputerWatch computer_;
+  TimeNs computer_at_ns_ = 0;
   std::unique_ptr<LinkLoop> link_;
   std::unique_ptr<ControlLoop> control_loop_;
   std::unique_ptr<Supervisor> supervisor_;

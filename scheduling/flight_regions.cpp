@@ -1,13 +1,16 @@
 #include "scheduling/flight_regions.h"
 
 #include <algorithm>
+#include <cstring>
 #include <new>
 #include <stdexcept>
 
 #include "rt/clock.h"
 #include "scheduling/flow_ring.h"
+#include "shm/broadcast_ring.h"
 #include "shm/topics.h"
 #include "types/messages.h"
+#include "types/position_sample.h"
 
 namespace wasp::scheduling {
 namespace {
@@ -25,6 +28,7 @@ shm::Region create_flight_region(const std::string& instance, const BehaviourRin
   std::vector<shm::TopicSpec> specs{
       {shm::kImu, "Imu", TopicKind::kRing, shm::kImuSlots, sizeof(ImuSample)},
       {shm::kAttitude, "Attitude", TopicKind::kRing, shm::kAttitudeSlots, sizeof(AttitudeSample)},
+      {shm::kPosition, "Position", TopicKind::kRing, shm::kPositionSlots, sizeof(PositionSample)},
       {shm::kCommand, "Command", TopicKind::kRing, shm::kCommandSlots, sizeof(Command)},
       {shm::kStages, "StageTable", TopicKind::kBlock, 1, sizeof(StageTable)},
       {"run", "RunStatus", TopicKind::kBlock, 1, sizeof(RunStatus)},
@@ -71,6 +75,21 @@ shm::Region attach_camera(const std::string& instance, double patience_s, const 
     }
     rt::sleep_until(rt::now() + 20 * kMillisecond);
   }
+}
+
+void check_frame_size(const shm::Region& camera, const char* topic, const Intrinsics& promised, const char* section) {
+  const shm::RingReader ring(camera, topic, "Frame");
+  const shm::Sample newest = ring.look(ring.newest());
+  if (!newest) return;
+  FrameHeader header;
+  std::memcpy(&header, newest.data, sizeof header);
+  if (!ring.intact(newest)) return;
+  const auto size = [](auto width, auto height) { return std::to_string(width) + " x " + std::to_string(height); };
+  if (static_cast<int>(header.width_px) == promised.width_px &&
+      static_cast<int>(header.height_px) == promised.height_px)
+    return;
+  throw std::runtime_error(std::string("the camera's '") + topic + "' is " + size(header.width_px, header.height_px) +
+                           " pixels, but [" + section + "] says " + size(promised.width_px, promised.height_px));
 }
 
 }  // namespace wasp::scheduling

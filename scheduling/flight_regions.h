@@ -7,6 +7,7 @@
 
 #include "scheduling/stage_table.h"
 #include "shm/region.h"
+#include "types/camera.h"
 
 namespace wasp::scheduling {
 
@@ -29,5 +30,9 @@ RunStatus& run_status(const shm::Region& flight);
 /// Waits for wasp.<instance>.camera, written by another process, to offer the streams. Throws std::runtime_error after
 /// `patience_s`, or as soon as `cancelled` says so.
 shm::Region attach_camera(const std::string& instance, double patience_s, const std::function<bool()>& cancelled);
+
+/// Throws std::runtime_error naming both sizes if the newest frame of a stream is of another one than `section` of the
+/// configuration promises. A stream that has shown nothing yet passes: its frames are judged one by one.
+void check_frame_size(const shm::Region& camera, const char* topic, const Intrinsics& promised, const char* section);
 
 }  // namespace wasp::scheduling

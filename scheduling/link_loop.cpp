@@ -1,16 +1,21 @@
 #include "scheduling/link_loop.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "rt/clock.h"
+#include "scheduling/words.h"
 #include "shm/topics.h"
+#include "types/position_sample.h"
 
 namespace wasp::scheduling {
 namespace {
 constexpr DurationNs kPatience = 20 * kMillisecond;  // longest sleep: the stop flag is seen by then
 constexpr DurationNs kTimesyncPeriod = 200 * kMillisecond;
 constexpr DurationNs kReopenPeriod = 50 * kMillisecond;
-constexpr int kRoomForReply_bytes = 1024;  // pending output below which an answer may go out
+constexpr DurationNs kPatienceWithFrames = 2 * kSecond;  // bytes come, frames do not: say so
+constexpr std::uint64_t kSenselessBytes = 200;
+constexpr std::size_t kQuestionBytes = 60;  // of a command, signed
 constexpr int kReadsPerWake = 8;
 constexpr DurationNs kQuiet = 1 * kSecond;            // after it a refusal is news again
 constexpr DurationNs kRefusalNews = 10 * kSecond;     // the same refusal of a command is said again after it
@@ -18,15 +23,20 @@ constexpr DurationNs kStranger = 300 * kMillisecond;  // others speak, the autop
 constexpr DurationNs kStrangerPeriod = 10 * kSecond;
 constexpr DurationNs kMovedAfter = 2 * kSecond;  // a datagram peer so long silent may come back from another port
 constexpr DurationNs kAutopilotBeat = 200 * kMillisecond;
+constexpr DurationNs kCredible = 500 * kMillisecond;  // age of a position at its arrival
 }  // namespace
 
 LinkLoop::LinkLoop(const shm::Region& flight, drivers::LinePort& port, drivers::AutopilotLink& autopilot,
                    StageTable& stages, rt::Seqlock<LinkReport>& report, EventQueue& events, ThreadWatch& watch,
-                   const drivers::SetupWish& wish)
+                   const drivers::SetupWish& wish, const LinkServices& services)
     : port_(port),
       autopilot_(autopilot),
       imu_(flight, shm::kImu, "Imu"),
       attitude_(flight, shm::kAttitude, "Attitude"),
+      position_(flight, shm::kPosition, "Position"),
+      commands_(flight, shm::kCommand, "Command"),
+      services_(services),
+      gate_(services.gate),
       age_(stages.add("link", "imu age", 0)),
       compute_(stages.add("link", "compute", watch.budget_ns)),
       report_(report),
@@ -37,7 +47,7 @@ LinkLoop::LinkLoop(const shm::Region& flight, drivers::LinePort& port, drivers::
 void LinkLoop::run(LoopControl& control) {
   RealtimeLoop loop(control, watch_);
   faults_.use(control.faults);
-  opened_at_ns_ = rt::now();
+  opened_at_ns_ = understood_at_ns_ = rt::now();
   while (loop.tick()) {
     if (gone_)
       reopen(control);
@@ -47,15 +57,37 @@ void LinkLoop::run(LoopControl& control) {
 }
 
 void LinkLoop::serve(LoopControl& control) WASP_REALTIME {
-  ask_for_time(rt::now());
-  set_up(rt::now(), *control.status);
   if (rt::now() > peer_until_ns_) port_.forget_peer();
-  if (!port_.wait_readable(rt::now() + kPatience)) return;
+  const bool readable = port_.wait_readable(rt::now() + kPatience);
   const TimeNs woken_ns = rt::now();
-  take(control);
+  look_at_line();
+  if (readable) take(control);
+  if (gone_) return;
+  ask_for_time(woken_ns);
+  set_up(woken_ns, *control.status);
+  speak();
+  if (!readable) return;
   const TimeNs done_ns = rt::now();
   compute_->record(done_ns - woken_ns);
   watch_.trace.record(done_ns, rt::TraceKind::kDone, 0, done_ns - woken_ns);
+}
+
+/// When the next setpoint falls due, and until when the line is busy.
+void LinkLoop::look_at_line() WASP_REALTIME {
+  const TimeNs now_ns = rt::now();
+  gate_.look(port_.written_total(), now_ns);
+  Command command;
+  const bool ticks = commands_.copy_newest(command) && now_ns - command.due_at_ns < 3 * services_.control_period_ns;
+  gate_.next_setpoint(ticks ? command.due_at_ns + services_.control_period_ns : kNever);
+}
+
+/// Telemetry, as far as there is room.
+void LinkLoop::speak() WASP_REALTIME {
+  if (services_.telemetry == nullptr) return;
+  services_.telemetry->serve(rt::now(), gate_, [this](std::span<const std::uint8_t> bytes) noexcept {
+    port_.write(bytes);
+    gate_.look(port_.written_total(), rt::now());
+  });
 }
 
 /// What has arrived, until the line is empty.
@@ -79,9 +111,28 @@ void LinkLoop::take(LoopControl& control) WASP_REALTIME {
       report_.store(now_);
     }
   }
+  watch_for_sense(received_at_ns_);
   control.status->bad_frames.store(autopilot_.wire_counts().bad_crc, std::memory_order_relaxed);
   watch_the_other_side(*control.status);
   ask_for_beats();
+}
+
+/// Bytes without a single frame among them come of a wrong baud rate, or of a device that is no autopilot.
+void LinkLoop::watch_for_sense(TimeNs now_ns) WASP_REALTIME {
+  const mavlink::Counts& counts = autopilot_.wire_counts();
+  if (counts.good != frames_understood_) {
+    frames_understood_ = counts.good;
+    bytes_understood_ = counts.bytes;
+    understood_at_ns_ = now_ns;
+    sense_missed_ = false;
+    return;
+  }
+  const std::uint64_t bytes = counts.bytes - bytes_understood_;
+  if (sense_missed_ || bytes < kSenselessBytes || now_ns - understood_at_ns_ < kPatienceWithFrames) return;
+  sense_missed_ = true;
+  Words words;
+  words << bytes << " bytes but no frame (" << counts.good << " before): wrong baud rate?";
+  events_.say(now_ns, "the autopilot's line: ", words.view());
 }
 
 /// What the driver counts and somebody must hear of: samples without numbers, a clock that began anew, strangers in the
@@ -98,7 +149,12 @@ void LinkLoop::watch_the_other_side(RunStatus& status) WASP_REALTIME {
   if (now.reboots != seen_.reboots) setup_.restart();
   const bool silent = !heard_ && received_at_ns_ - std::max(now_.heard_at_ns, opened_at_ns_) > kStranger;
   if (now.foreign_systems != seen_.foreign_systems && silent && received_at_ns_ >= stranger_due_ns_) {
-    events_.say(received_at_ns_, "the autopilot is silent, but another system speaks: [autopilot] system_id?");
+    Words words;
+    words << "id";
+    for (const mavlink::SourceCounts& source : autopilot_.sources())
+      if (source.system_id != autopilot_.identity().autopilot_system_id) words << ' ' << source.system_id;
+    words << ": [autopilot] system_id?";
+    events_.say(received_at_ns_, "the autopilot is silent, but another system speaks, ", words.view());
     stranger_due_ns_ = received_at_ns_ + kStrangerPeriod;
   }
   seen_ = now;
@@ -122,8 +178,9 @@ bool LinkLoop::usable(drivers::SampleFault fault, std::string_view head, Told& t
 /// Asks the autopilot what it is and what it needs, and tells control and the log.
 void LinkLoop::set_up(TimeNs now_ns, RunStatus& status) WASP_REALTIME {
   std::array<std::uint8_t, mavlink::kMaxFrame> out;
-  if (const std::size_t n = setup_.next_question(now_ns, autopilot_, out); n != 0)
-    reply(std::span<const std::uint8_t>(out.data(), n));
+  if (gate_.fits(kQuestionBytes, now_ns))
+    if (const std::size_t n = setup_.next_question(now_ns, autopilot_, out); n != 0)
+      reply(std::span<const std::uint8_t>(out.data(), n));
   drivers::TextLine line;
   bool verdict = false;
   if (setup_.take_news(line, verdict)) events_.say(now_ns, line.view());
@@ -135,15 +192,21 @@ void LinkLoop::set_up(TimeNs now_ns, RunStatus& status) WASP_REALTIME {
 
 /// Its mode and arming are to be known within half a second; by itself it says them once a second.
 void LinkLoop::ask_for_beats() WASP_REALTIME {
-  if (beats_asked_ || !heartbeat_seen_) return;
+  if (beats_asked_ || !heartbeat_seen_ || !gate_.fits(2 * kQuestionBytes, received_at_ns_)) return;
   beats_asked_ = true;
   std::array<std::uint8_t, mavlink::kMaxFrame> out;
   const std::size_t n = autopilot_.encode_message_interval(mavlink::Heartbeat::kId, kAutopilotBeat, 0, out);
   reply(std::span<const std::uint8_t>(out.data(), n));
+  if (services_.position_period_ns <= 0) return;
+  const std::size_t m =
+      autopilot_.encode_message_interval(mavlink::LocalPositionNed::kId, services_.position_period_ns, 0, out);
+  reply(std::span<const std::uint8_t>(out.data(), m));
 }
 
+/// Again at the next wake-up where there is no room now.
 void LinkLoop::ask_for_time(TimeNs now_ns) WASP_REALTIME {
-  if (now_ns < timesync_due_ns_) return;
+  constexpr std::size_t kSize = mavlink::Timesync::kMaxLength + mavlink::kMaxFrame - mavlink::kMaxPayload;
+  if (now_ns < timesync_due_ns_ || !gate_.fits(kSize, now_ns)) return;
   timesync_due_ns_ = now_ns + kTimesyncPeriod;
   std::array<std::uint8_t, mavlink::kMaxFrame> out;
   reply(std::span<const std::uint8_t>(out.data(), autopilot_.encode_timesync_request(now_ns, out)));
@@ -153,8 +216,8 @@ void LinkLoop::reopen(LoopControl& control) {
   const rt::NonRealtimeSection opening;  // nothing waits for a line that is gone
   rt::sleep_until(rt::now() + kReopenPeriod);
   if (!port_.try_reopen()) return;
-  gone_ = beats_asked_ = false;
-  opened_at_ns_ = rt::now();
+  gone_ = beats_asked_ = sense_missed_ = false;
+  opened_at_ns_ = understood_at_ns_ = rt::now();
   autopilot_.restart();
   control.status->link_reconnects.fetch_add(1, std::memory_order_relaxed);
   events_.say(rt::now(), "serial line reopened");
@@ -166,6 +229,7 @@ void LinkLoop::on_imu(const ImuSample& received) WASP_REALTIME {
   if (!faults_.pass(sample, received_at_ns_)) return;
   if (!usable(imu_judge_.judge(sample, received_at_ns_), "imu refused: ", imu_told_)) return;
   imu_.write(sample, received_at_ns_);
+  if (services_.telemetry != nullptr) services_.telemetry->note(sample);
   age_->record(received_at_ns_ - sample.exposed_at_ns);
 }
 
@@ -210,8 +274,35 @@ void LinkLoop::on_statustext(std::uint8_t, std::string_view text) WASP_REALTIME 
   events_.say(received_at_ns_, "autopilot: ", text);
 }
 
+/// What the link does not handle itself: where the vehicle is, and what others ask of us.
+void LinkLoop::on_frame(const mavlink::Frame& frame) WASP_REALTIME {
+  const auto& self = autopilot_.identity();
+  const bool autopilot =
+      frame.system_id == self.autopilot_system_id && frame.component_id == self.autopilot_component_id;
+  if (autopilot && frame.is<mavlink::LocalPositionNed>()) note_position(frame.as<mavlink::LocalPositionNed>());
+  if (services_.telemetry != nullptr) services_.telemetry->receive(frame, received_at_ns_);
+}
+
+void LinkLoop::note_position(const mavlink::LocalPositionNed& m) WASP_REALTIME {
+  PositionSample sample;
+  sample.position_ned_m = {m.x, m.y, m.z};
+  sample.velocity_ned_mps = {m.vx, m.vy, m.vz};
+  for (std::size_t i = 0; i < 3; ++i)
+    if (!std::isfinite(sample.position_ned_m[i]) || !std::isfinite(sample.velocity_ned_mps[i])) return;
+  const TimeNs remote_ns = static_cast<TimeNs>(m.time_boot_ms) * kMillisecond;
+  const TimeNs mapped_ns = autopilot_.clock().synced() ? autopilot_.clock().to_local(remote_ns) : received_at_ns_;
+  const bool credible = mapped_ns <= received_at_ns_ && received_at_ns_ - mapped_ns < kCredible;
+  sample.exposed_at_ns = credible ? mapped_ns : received_at_ns_;
+  sample.sequence = positions_++;
+  sample.armed = now_.armed;
+  position_.write(sample, received_at_ns_);
+}
+
+/// Whole, and before the next setpoint is due, or not at all: who asked asks again.
 void LinkLoop::reply(std::span<const std::uint8_t> bytes) WASP_REALTIME {
-  if (port_.pending_output_bytes() < kRoomForReply_bytes) port_.write(bytes);
+  if (!gate_.fits(bytes.size(), rt::now())) return;
+  port_.write(bytes);
+  gate_.look(port_.written_total(), rt::now());
 }
 
 }  // namespace wasp::scheduling

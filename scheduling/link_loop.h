@@ -1,6 +1,8 @@
 // The link thread: bytes from the serial line become IMU and attitude samples in the rings, if they are plausible
 // (drivers/sample_judge.h), and a report on the autopilot. It asks for the autopilot's time and answers when asked
-// (only while the line has room, so that an answer never splits a setpoint) and reopens a lost line by itself.
+// and lets telemetry speak, all of it only where the line has room before the next setpoint (line_gate.h), so that no
+// setpoint is split or waits; reopens a lost line by itself, and says what is wrong with one on which nobody is
+// understood.
 #pragma once
 
 #include "drivers/autopilot_link.h"
@@ -10,17 +12,27 @@
 #include "rt/seqlock.h"
 #include "scheduling/control_loop.h"
 #include "scheduling/events.h"
+#include "scheduling/line_gate.h"
 #include "scheduling/realtime_loop.h"
 #include "scheduling/sample_faults.h"
+#include "scheduling/telemetry.h"
 #include "shm/broadcast_ring.h"
 
 namespace wasp::scheduling {
+
+/// What the link thread does besides.
+struct LinkServices {
+  Telemetry* telemetry = nullptr;  ///< nullptr: nothing is told, and nobody is answered
+  LineGateParams gate = {};
+  DurationNs control_period_ns = 50 * kMillisecond;
+  DurationNs position_period_ns = 0;  ///< of LOCAL_POSITION_NED, asked for; 0: not asked for, taken when it comes
+};
 
 class LinkLoop {
  public:
   LinkLoop(const shm::Region& flight, drivers::LinePort& port, drivers::AutopilotLink& autopilot, StageTable& stages,
            rt::Seqlock<LinkReport>& report, EventQueue& events, ThreadWatch& watch,
-           const drivers::SetupWish& wish = {});
+           const drivers::SetupWish& wish = {}, const LinkServices& services = {});
   /// Runs until the stop flag. Real-time loop.
   void run(LoopControl& control);
 
@@ -48,10 +60,17 @@ class LinkLoop {
   void watch_the_other_side(RunStatus& status) WASP_REALTIME;
   void ask_for_beats() WASP_REALTIME;
   void set_up(TimeNs now_ns, RunStatus& status) WASP_REALTIME;
+  void look_at_line() WASP_REALTIME;
+  void speak() WASP_REALTIME;
+  void note_position(const mavlink::LocalPositionNed& m) WASP_REALTIME;
+  void watch_for_sense(TimeNs now_ns) WASP_REALTIME;
 
   drivers::LinePort& port_;
   drivers::AutopilotLink& autopilot_;
-  shm::RingWriter imu_, attitude_;
+  shm::RingWriter imu_, attitude_, position_;
+  shm::RingReader commands_;
+  LinkServices services_;
+  LineGate gate_;
   Stage *age_, *compute_;
   rt::Seqlock<LinkReport>& report_;
   EventQueue& events_;
@@ -73,6 +92,10 @@ class LinkLoop {
   std::uint16_t refused_command_ = 0;  ///< what was last said of an acknowledgement, and until when it is no news
   std::uint8_t refused_result_ = 0;
   TimeNs refused_until_ns_ = 0;
+  std::uint32_t positions_ = 0;
+  std::uint64_t bytes_understood_ = 0, frames_understood_ = 0;  ///< of the parser, when a frame last verified
+  TimeNs understood_at_ns_ = 0;
+  bool sense_missed_ = false;
   std::array<std::uint8_t, 4096> buffer_{};
 };
 

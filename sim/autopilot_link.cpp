@@ -202,13 +202,10 @@ CommandResult AutopilotLink::reboot(const mavlink::CommandLong& command, TimeNs 
   if (flight_.armed() && command.param6 != kForceReboot) return CommandResult::kDenied;
   flight_.restart();
   apply_parameters();
-  beat_every_ = kTicksPerSecond;
-  imu_every_ = is(Flavour::kArduPilot) ? 100 : is(Flavour::kPx4) ? 4 : 1;  // what was asked of it is forgotten
-  attitude_every_ = is(Flavour::kArduPilot) ? 50 : 2;
   failures_ = SensorFailures();
   clock_offset_ns_ = -now_ns;
   ticks_ = 0;  // a heartbeat first
-  for (Stream& stream : streams_) stream.every = stream.usual;
+  for (Stream& stream : streams_) stream.every = stream.usual;  // what was asked of it is forgotten
   silent_until_ns_ = now_ns + kRebootTime;
   return CommandResult::kAccepted;
 }

@@ -113,6 +113,33 @@ TEST_F(FrameSourceTest, AFrameOfAnotherSizeThanTheCameraPromisedIsRefused) {
   EXPECT_EQ(source.counts().of(FrameFault::kMalformed), 0u);
 }
 
+TEST_F(FrameSourceTest, ADepthStreamAtAnotherResolutionIsRefusedAndCounted) {
+  FrameSource alone(camera_, flight_, Stream::kDepth, {.width_px = 2 * kWidth, .height_px = 2 * kHeight});
+  show_depth(1, 100);
+  EXPECT_FALSE(take(alone));
+  EXPECT_EQ(alone.counts().of(FrameFault::kMalformed), 1u);
+  FrameSource right(camera_, flight_, Stream::kDepth, {.width_px = kWidth, .height_px = kHeight});
+  show_depth(2, 200);
+  EXPECT_TRUE(take(right).depth.valid());
+}
+
+TEST_F(FrameSourceTest, ACameraOfAnotherSizeThanConfiguredIsRefusedBeforeTheFlightNamingBoth) {
+  Intrinsics right, wrong;
+  right.width_px = kWidth, right.height_px = kHeight;
+  wrong.width_px = 640, wrong.height_px = 480;
+  EXPECT_NO_THROW(check_frame_size(camera_, shm::kDepth, wrong, "camera")) << "it has shown nothing yet";
+  show_depth(1, 100);
+  EXPECT_NO_THROW(check_frame_size(camera_, shm::kDepth, right, "camera"));
+  try {
+    check_frame_size(camera_, shm::kDepth, wrong, "camera");
+    FAIL();
+  } catch (const std::runtime_error& error) {
+    const std::string text = error.what();
+    EXPECT_NE(text.find("'depth'"), std::string::npos) << text;
+    EXPECT_NE(text.find("[camera] says 640 x 480"), std::string::npos) << text;
+  }
+}
+
 TEST_F(FrameSourceTest, AFlowFieldIsReadInPlaceAndOneThatLiesIsNotFollowed) {
   FrameSource source(camera_, flight_, Stream::kFlow);
   FlowWriter writer(flight_, shm::kFlow);
