@@ -29,7 +29,7 @@ constexpr const char* kUsage =
     "  flight   the flying process alone\n"
     "  guard    the same, under a guardian that answers for it when it dies or hangs (fly starts it so)\n"
     "  plan     can the thread table keep its deadlines? response times, before any flight\n"
-    "  sim      the simulator: camera and autopilot as another process\n"
+    "  sim      the simulator: camera and autopilot as another process, or the camera of another autopilot (--follow)\n"
     "  world    make and look at simulated worlds, VRML97 files\n"
     "  camera   a real camera (V4L2, IIDC, Kinect) into shared memory; --list shows what is plugged in\n"
     "  top      live rates, ages and latencies of a running flight, read-only\n"

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "drivers/text_line.h"
 #include "rt/clock.h"
-#include "scheduling/words.h"
 #include "shm/topics.h"
 #include "types/position_sample.h"
 
@@ -77,7 +77,9 @@ void LinkLoop::look_at_line() WASP_REALTIME {
   const TimeNs now_ns = rt::now();
   gate_.look(port_.written_total(), now_ns);
   Command command;
-  const bool ticks = commands_.copy_newest(command) && now_ns - command.due_at_ns < 3 * services_.control_period_ns;
+  // One that sends nothing while it is on the ground will hardly begin within a period.
+  const bool ticks = commands_.copy_newest(command) && command.sent != 0 &&
+                     now_ns - command.due_at_ns < 3 * services_.control_period_ns;
   gate_.next_setpoint(ticks ? command.due_at_ns + services_.control_period_ns : kNever);
 }
 
@@ -130,8 +132,9 @@ void LinkLoop::watch_for_sense(TimeNs now_ns) WASP_REALTIME {
   const std::uint64_t bytes = counts.bytes - bytes_understood_;
   if (sense_missed_ || bytes < kSenselessBytes || now_ns - understood_at_ns_ < kPatienceWithFrames) return;
   sense_missed_ = true;
-  Words words;
-  words << bytes << " bytes but no frame (" << counts.good << " before): wrong baud rate?";
+  drivers::TextLine words;
+  words << static_cast<double>(bytes) << " bytes but no frame (" << static_cast<double>(counts.good)
+        << " before): wrong baud rate?";
   events_.say(now_ns, "the autopilot's line: ", words.view());
 }
 
@@ -149,10 +152,11 @@ void LinkLoop::watch_the_other_side(RunStatus& status) WASP_REALTIME {
   if (now.reboots != seen_.reboots) setup_.restart();
   const bool silent = !heard_ && received_at_ns_ - std::max(now_.heard_at_ns, opened_at_ns_) > kStranger;
   if (now.foreign_systems != seen_.foreign_systems && silent && received_at_ns_ >= stranger_due_ns_) {
-    Words words;
+    drivers::TextLine words;
     words << "id";
     for (const mavlink::SourceCounts& source : autopilot_.sources())
-      if (source.system_id != autopilot_.identity().autopilot_system_id) words << ' ' << source.system_id;
+      if (source.system_id != autopilot_.identity().autopilot_system_id)
+        words << " " << static_cast<double>(source.system_id);
     words << ": [autopilot] system_id?";
     events_.say(received_at_ns_, "the autopilot is silent, but another system speaks, ", words.view());
     stranger_due_ns_ = received_at_ns_ + kStrangerPeriod;
@@ -249,11 +253,6 @@ void LinkLoop::on_heartbeat(const drivers::AutopilotStatus& status) WASP_REALTIM
   setup_.on_heartbeat(status);
 }
 
-void LinkLoop::on_frame(const mavlink::Frame& frame) WASP_REALTIME {
-  if (setup_.on_frame(frame)) return;
-  autopilot_.refuse_command(frame, *this);
-}
-
 void LinkLoop::on_ack(std::uint16_t command, std::uint8_t result) WASP_REALTIME {
   using namespace mavlink;  // NOLINT: its enumerations
   if (result == mav_result::kAccepted || result == mav_result::kInProgress) return;
@@ -276,11 +275,15 @@ void LinkLoop::on_statustext(std::uint8_t, std::string_view text) WASP_REALTIME 
 
 /// What the link does not handle itself: where the vehicle is, and what others ask of us.
 void LinkLoop::on_frame(const mavlink::Frame& frame) WASP_REALTIME {
+  if (setup_.on_frame(frame)) return;
   const auto& self = autopilot_.identity();
   const bool autopilot =
       frame.system_id == self.autopilot_system_id && frame.component_id == self.autopilot_component_id;
   if (autopilot && frame.is<mavlink::LocalPositionNed>()) note_position(frame.as<mavlink::LocalPositionNed>());
-  if (services_.telemetry != nullptr) services_.telemetry->receive(frame, received_at_ns_);
+  if (services_.telemetry != nullptr)
+    services_.telemetry->receive(frame, received_at_ns_);
+  else
+    autopilot_.refuse_command(frame, *this);
 }
 
 void LinkLoop::note_position(const mavlink::LocalPositionNed& m) WASP_REALTIME {

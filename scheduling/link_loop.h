@@ -31,8 +31,8 @@ struct LinkServices {
 class LinkLoop {
  public:
   LinkLoop(const shm::Region& flight, drivers::LinePort& port, drivers::AutopilotLink& autopilot, StageTable& stages,
-           rt::Seqlock<LinkReport>& report, EventQueue& events, ThreadWatch& watch,
-           const drivers::SetupWish& wish = {}, const LinkServices& services = {});
+           rt::Seqlock<LinkReport>& report, EventQueue& events, ThreadWatch& watch, const drivers::SetupWish& wish = {},
+           const LinkServices& services = {});
   /// Runs until the stop flag. Real-time loop.
   void run(LoopControl& control);
 
