@@ -290,6 +290,7 @@ void LinkLoop::on_statustext(std::uint8_t, std::string_view text) WASP_REALTIME 
 
 /// What the link does not handle itself: where the vehicle is, what it says of itself, and what others ask of us.
 void LinkLoop::on_frame(const mavlink::Frame& frame) WASP_REALTIME {
+  if (setup_.on_frame(frame)) return;
   const auto& self = autopilot_.identity();
   const bool autopilot =
       frame.system_id == self.autopilot_system_id && frame.component_id == self.autopilot_component_id;
