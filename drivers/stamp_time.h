@@ -2,6 +2,7 @@
 // where it jumped. Only differences mean anything: what is whose neighbour, and how many were lost between.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <cstdlib>
 
@@ -23,8 +24,8 @@ class StampTime {
       started_ = true;
       time_ns_ = arrived_at_ns;
     } else {
-      const auto by_counter =
-          static_cast<DurationNs>(static_cast<double>(static_cast<std::int32_t>(ticks - last_ticks_)) * ns_per_tick_);
+      const auto ahead = static_cast<std::int32_t>(ticks - last_ticks_);
+      const auto by_counter = static_cast<DurationNs>(std::llround(ahead * ns_per_tick_));
       const DurationNs by_arrival = arrived_at_ns - last_arrival_ns_;
       time_ns_ += std::llabs(by_counter - by_arrival) > kBelievedNs ? by_arrival : by_counter;
     }
