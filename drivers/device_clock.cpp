@@ -31,7 +31,7 @@ void DeviceClock::start(std::int64_t ticks, TimeNs arrived_at_ns) noexcept {
   started_ = true;
   origin_ticks_ = last_ticks_ = ticks;
   last_arrival_ns_ = arrived_at_ns;
-  filled_ = doubts_ = 0;
+  filled_ = doubts_ = set_aside_ = 0;
   slope_ = 0;
   anchor_ = {0, arrived_at_ns};
   keep(anchor_);
@@ -46,7 +46,7 @@ bool DeviceClock::add(std::uint32_t ticks, TimeNs arrived_at_ns) noexcept {
   const Point point{device_ns(unwrapped), arrived_at_ns - device_ns(unwrapped)};
   const DurationNs above_ns = point.offset_ns - line_at(point.device_ns);
   if (above_ns < -kEarlyNs || above_ns > kLateNs) return doubt(point, unwrapped, arrived_at_ns);
-  doubts_ = 0;
+  doubts_ = set_aside_ = 0;
   last_ticks_ = std::max(last_ticks_, unwrapped);
   last_arrival_ns_ = arrived_at_ns;
   keep(point);
@@ -58,7 +58,7 @@ bool DeviceClock::doubt(const Point& point, std::int64_t ticks, TimeNs arrived_a
     doubts_ = 0;
     doubted_offset_ns_ = point.offset_ns;
   }
-  if (++doubts_ < kJumpAfter) return false;
+  if (++doubts_ < kJumpAfter && ++set_aside_ < kLostAfter) return false;
   start(ticks, arrived_at_ns);
   ++jumps_;
   return true;

@@ -2,7 +2,8 @@
 // Arrival is late by a least delay and a random one on top, never early, so the map is the line under all points
 // (stamp, arrival - stamp): the least of each second is kept for half a minute, and of all lines that no point lies
 // under, the one nearest to the points on average is taken: the edge of their lower hull above their mean. A stamp far
-// off the line is set aside; when several agree with each other the counter has jumped, and the map starts anew.
+// off the line is set aside; when several agree with each other the counter has jumped, and the map starts anew; so it
+// does when none was believed for long (a player that falls behind the time of its recording, as fakenect does).
 // Pure arithmetic: instants come in as arguments.
 #pragma once
 
@@ -23,6 +24,7 @@ class DeviceClock {
   static constexpr DurationNs kEarlyNs = 20 * kMillisecond;   ///< further under the line is no arrival of this clock
   static constexpr DurationNs kLateNs = 250 * kMillisecond;   ///< further above is not this clock either
   static constexpr int kJumpAfter = 5;                        ///< stamps set aside that agree with each other
+  static constexpr int kLostAfter = 90;                       ///< set aside in a row, whether they agree or not
 
   explicit DeviceClock(double ticks_per_s) : ns_per_tick_(1e9 / ticks_per_s) {}
 
@@ -57,7 +59,7 @@ class DeviceClock {
   int filled_ = 0;
   Point anchor_;  ///< the line goes through it
   double slope_ = 0;
-  int doubts_ = 0, jumps_ = 0;
+  int doubts_ = 0, set_aside_ = 0, jumps_ = 0;
   DurationNs doubted_offset_ns_ = 0;
 };
 

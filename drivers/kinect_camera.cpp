@@ -11,6 +11,7 @@
 #include "drivers/kinect_depth.h"
 #include "drivers/kinect_device.h"
 #include "drivers/kinect_images.h"
+#include "drivers/stamp_time.h"
 #include "rt/clock.h"
 
 namespace wasp::drivers {
@@ -93,6 +94,7 @@ class KinectCamera final : public CameraDriver {
     sink_ = &sink;
     const FrameSlot slot = sink.slot();
     clock_ = DeviceClock(kTicks_per_s);
+    stamps_ = StampTime(kTicks_per_s);
     pairs_ = ExposurePairs(kPeriodNs, slot.depth_mm != nullptr);
     last_sequence_ = 0;
     const TimeNs now_ns = rt::now();
@@ -153,7 +155,7 @@ class KinectCamera final : public CameraDriver {
 
   struct Stream {
     bool on = false;
-    TimeNs heard_at_ns = 0, last_exposed_ns = kNever;
+    TimeNs heard_at_ns = 0, last_place_ns = kNever;
     [[nodiscard]] bool stuck(TimeNs now_ns) const { return on && now_ns - heard_at_ns > kStuckNs; }
   };
 
@@ -180,64 +182,82 @@ class KinectCamera final : public CameraDriver {
     return format;
   }
 
+  /// An exposure: what is published, and its place among the others by the device's own count alone, which no delay on
+  /// the way can shift.
+  struct Dated {
+    FrameStamp stamp;
+    TimeNs place_ns = 0;
+  };
+
   /// When the image was exposed; none, counted as damaged, if packets of it were lost or it is not newer than the last.
-  std::optional<FrameStamp> date(std::uint32_t ticks, TimeNs now_ns, KinectStream which, const Choice& choice,
-                                 Stream& stream) {
+  std::optional<Dated> date(std::uint32_t ticks, TimeNs now_ns, KinectStream which, const Choice& choice,
+                            Stream& stream) {
     const auto packets = std::exchange(device_->log().packets[static_cast<std::size_t>(which)], {});
     stream.heard_at_ns = now_ns;
     const DurationNs readout_ns = settings_.readout_us >= 0
                                       ? static_cast<DurationNs>(settings_.readout_us * kMicrosecond)
                                       : choice.packets * kPacketNs;
-    FrameStamp stamp;
-    stamp.estimated = !clock_.add(ticks, now_ns);
-    stamp.exposed_at_ns = (stamp.estimated ? now_ns : clock_.to_local(ticks)) - readout_ns;
-    if (!packets.whole() || stamp.exposed_at_ns <= stream.last_exposed_ns) {
+    Dated dated;
+    dated.place_ns = stamps_.at(ticks, now_ns) - readout_ns;
+    dated.stamp.estimated = !clock_.add(ticks, now_ns);
+    dated.stamp.exposed_at_ns = (dated.stamp.estimated ? now_ns : clock_.to_local(ticks)) - readout_ns;
+    if (!packets.whole() || dated.place_ns <= stream.last_place_ns) {
       if (came_ == FrameEvent::kTimeout) came_ = FrameEvent::kCorrupt;
       return std::nullopt;
     }
-    stream.last_exposed_ns = stamp.exposed_at_ns;
-    return stamp;
+    stream.last_place_ns = dated.place_ns;
+    return dated;
   }
 
   void on_depth(std::uint32_t ticks, TimeNs now_ns) {
-    std::optional<FrameStamp> stamp = date(ticks, now_ns, KinectStream::kDepth, depth_, depth_stream_);
-    if (!stamp) return release_waiting();
+    std::optional<Dated> dated = date(ticks, now_ns, KinectStream::kDepth, depth_, depth_stream_);
+    if (!dated) return release_waiting();
     std::uint16_t* pixels = sink_->slot().depth_mm;
     sink_->announce();
     if (depth_.format == FREENECT_DEPTH_11BIT)
       kinect_depth(table_, {pixels, kKinectWidth, kKinectHeight, kKinectWidth}, pixels, kKinectWidth);
     else
       keep_range(pixels);
-    stamp->gray = false;
-    const ExposureStamp place = pairs_.add_depth(stamp->exposed_at_ns);
+    const ExposureStamp place = pairs_.add_depth(dated->place_ns);
     if (!pairs_.waits_for_newest()) release_waiting();
-    publish(*stamp, place);
+    depth_stamp_ = dated->stamp;
+    depth_stamp_.gray = false;
+    publish(depth_stamp_, place);
     library_->set_depth_buffer(device_->get(), sink_->slot().depth_mm);
     release_waiting();
   }
 
   void on_video(std::uint32_t ticks, TimeNs now_ns) {
-    std::optional<FrameStamp> stamp = date(ticks, now_ns, KinectStream::kVideo, video_, video_stream_);
-    if (!stamp) return;
+    std::optional<Dated> dated = date(ticks, now_ns, KinectStream::kVideo, video_, video_stream_);
+    if (!dated) return;
     release_waiting();
     std::uint8_t* gray = sink_->slot().gray;
     if (video_.format == FREENECT_VIDEO_IR_8BIT)
       crop_infrared(video_pixels_.data(), gray);
     else
       rgb_to_gray(video_pixels_.data(), kKinectPixels, gray);
-    stamp->depth = false;
-    waiting_stamp_ = *stamp;
+    gray_stamp_ = dated->stamp;
+    gray_stamp_.depth = false;
     patience_ends_ns_ = now_ns + kPeriodNs;
-    if (const auto place = pairs_.add_gray(stamp->exposed_at_ns)) publish(*stamp, *place);
+    if (const auto place = pairs_.add_gray(dated->place_ns)) publish_gray(*place);
   }
 
   /// The grey image that waits in its slot for its depth.
   void release_waiting() {
-    if (const auto place = pairs_.take_waiting()) publish(waiting_stamp_, *place);
+    if (const auto place = pairs_.take_waiting()) publish_gray(*place);
+  }
+
+  /// With its depth image's time if it has one.
+  void publish_gray(const ExposureStamp& place) {
+    FrameStamp stamp = gray_stamp_;
+    if (place.exposed_at_ns == depth_stream_.last_place_ns) {
+      stamp.exposed_at_ns = depth_stamp_.exposed_at_ns;
+      stamp.estimated = depth_stamp_.estimated;
+    }
+    publish(stamp, place);
   }
 
   void publish(FrameStamp stamp, const ExposureStamp& place) {
-    stamp.exposed_at_ns = place.exposed_at_ns;
     stamp.sequence = last_sequence_ = std::max(last_sequence_, place.sequence);
     sink_->publish(stamp);
     came_ = FrameEvent::kFrame;
@@ -261,9 +281,10 @@ class KinectCamera final : public CameraDriver {
   std::vector<std::uint8_t> video_pixels_;
   FrameSink* sink_ = nullptr;
   DeviceClock clock_{kTicks_per_s};
+  StampTime stamps_{kTicks_per_s};
   ExposurePairs pairs_{kPeriodNs, true};
   Stream depth_stream_, video_stream_;
-  FrameStamp waiting_stamp_;
+  FrameStamp depth_stamp_, gray_stamp_;  ///< of the newest images
   TimeNs patience_ends_ns_ = 0;
   std::uint32_t last_sequence_ = 0;
   bool streaming_ = false;
