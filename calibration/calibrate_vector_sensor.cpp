@@ -144,7 +144,7 @@ Ellipsoid best_model(const VectorSensorOptions& o, const Samples& s, const Point
   const auto richer = [&](EllipsoidModel m, const Ellipsoid& than) {
     if (!spare(m)) return than;
     const auto e = fit_ellipsoid(points, m, than.norm, noise);
-    return e && e->least_eigenvalue >= kLeastEigenvalue && e->used_count * 20 >= than.used_count * 19 ? *e : than;
+    return e && e->least_eigenvalue >= kLeastEigenvalue && e->used_count * 10 >= than.used_count * 9 ? *e : than;
   };
   Ellipsoid best = std::move(axes);
   if (o.model != "axes") best = richer({true, false}, best);
