@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <map>
