@@ -95,8 +95,9 @@ Verdict judge_px4(const CheckContext& c, const Readings& r) noexcept {
   return v;
 }
 
-/// True if the thrust field is thrust; `refusal` where that cannot be told.
-bool thrust_is_thrust(const CheckContext& c, const Readings& r, TextLine& refusal) noexcept {
+/// True if the thrust field is thrust. Where that cannot be told it asks for GUID_OPTIONS to be written without the bit,
+/// and refuses until it is: a development version of 4.1 reads back a default that nobody set.
+bool thrust_is_thrust(const CheckContext& c, const Readings& r, Verdict& v) noexcept {
   const auto bit = [](const Reading& reading, double end, unsigned mask) noexcept {
     const bool sane = reading.state == ReadingState::kKnown && reading.value >= 0 && reading.value < end &&
                       reading.value == std::floor(reading.value);
@@ -104,9 +105,12 @@ bool thrust_is_thrust(const CheckContext& c, const Readings& r, TextLine& refusa
   };
   const bool by_guid = bit(at(r, kGuidOptions), kOptionsEnd, 8), by_dev = bit(at(r, kDevOptions), 65536, 4);
   const bool old = c.version != 0 && c.version < kVersion4_1Release;  // its GUID_OPTIONS has no such bit
-  if (old && by_guid && !by_dev)
-    refusal = because("GUID_OPTIONS", at(r, kGuidOptions).value,
-                      "bit 3 means thrust from 4.1 on, and this is a version between; set it to 0");
+  if (old && by_guid && !by_dev) {
+    v.to_write = kGuidOptions;
+    v.value_to_write = at(r, kGuidOptions).value - 8;
+    v.refusal = because("GUID_OPTIONS", at(r, kGuidOptions).value,
+                        "bit 3 means thrust from 4.1 on, and this is a version between; wasp writes it without");
+  }
   return old ? by_dev : by_guid;
 }
 
@@ -127,7 +131,7 @@ bool climb_scales(const Readings& r, AutopilotSemantics& s) noexcept {
 Verdict judge_copter(const CheckContext& c, const Readings& r) noexcept {
   Verdict v;
   v.semantics = semantics_of(c.wish);
-  const bool thrust = c.wish.thrust || (!c.wish.climb_rate && thrust_is_thrust(c, r, v.refusal));
+  const bool thrust = c.wish.thrust || (!c.wish.climb_rate && thrust_is_thrust(c, r, v));
   v.semantics.vertical = thrust ? VerticalChannel::kThrust : VerticalChannel::kClimbRate;
   v.semantics.learn_hover = thrust && c.wish.hover_share <= 0;
   v.failsafe << "after " << (known(r, kGuidTimeout) ? at(r, kGuidTimeout).value : 1.0)

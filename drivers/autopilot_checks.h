@@ -52,6 +52,8 @@ struct Verdict {
   AutopilotSemantics semantics;
   TextLine refusal;   ///< why the vehicle must not be armed: parameter, value, what to set; empty: it may
   TextLine failsafe;  ///< what the autopilot does when the stream of setpoints ends
+  int to_write = -1;  ///< a parameter whose value means nothing until it is written explicitly; -1: none
+  double value_to_write = 0;
 };
 Verdict judge(const CheckContext& context, const Readings& readings) WASP_REALTIME;
 

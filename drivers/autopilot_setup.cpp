@@ -57,7 +57,7 @@ AutopilotSetup::AutopilotSetup(const SetupWish& wish, const LinkIdentity& identi
 void AutopilotSetup::restart() WASP_REALTIME {
   readings_ = {};
   questions_ = {};
-  version_question_ = {};
+  version_question_ = write_question_ = {};
   version_known_ = concluded_ = heard_told_ = streams_fall_back_ = false;
   conclusion_told_ = true;
   streams_due_ns_ = 0;
@@ -175,6 +175,21 @@ std::size_t AutopilotSetup::read_parameter(std::size_t i, AutopilotLink& link,
   return link.encode(m, out);
 }
 
+/// Its PARAM_VALUE, which answers, is judged as any other.
+std::size_t AutopilotSetup::write_parameter(TimeNs now_ns, AutopilotLink& link,
+                                            std::span<std::uint8_t> out) WASP_REALTIME {
+  if (verdict_.to_write < 0 || write_question_.tries >= kTries || !due(write_question_, now_ns)) return 0;
+  mavlink::ParamSet m;
+  m.target_system = identity_.autopilot_system_id;
+  m.target_component = identity_.autopilot_component_id;
+  m.param_id = parameter_name(names_[static_cast<std::size_t>(verdict_.to_write)]);
+  m.param_type = mavlink::mav_param_type::kInt32;
+  const auto value = encode_parameter(encoding_, m.param_type, verdict_.value_to_write);
+  if (!value) return 0;
+  m.param_value = *value;
+  return link.encode(m, out);
+}
+
 /// Values mean nothing before the encoding is known, so the version comes first.
 std::size_t AutopilotSetup::ask_parameter(TimeNs now_ns, AutopilotLink& link,
                                           std::span<std::uint8_t> out) WASP_REALTIME {
@@ -187,7 +202,9 @@ std::size_t AutopilotSetup::ask_parameter(TimeNs now_ns, AutopilotLink& link,
       return read_parameter(i, link, out);
   }
   if (!concluded_ && all_read()) conclude();
-  if (!concluded_ || status_.armed || names_.empty() || now_ns < refresh_due_ns_) return 0;
+  if (!concluded_ || status_.armed || names_.empty()) return 0;
+  if (const std::size_t n = write_parameter(now_ns, link, out); n != 0) return n;
+  if (now_ns < refresh_due_ns_) return 0;
   refresh_due_ns_ = now_ns + kRefreshEvery;
   do refreshed_ = (refreshed_ + 1) % names_.size();
   while (readings_[refreshed_].state != ReadingState::kKnown && refreshed_ != 0);

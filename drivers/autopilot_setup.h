@@ -67,6 +67,7 @@ class AutopilotSetup {
   std::size_t ask_parameter(TimeNs now_ns, AutopilotLink& link, std::span<std::uint8_t> out) WASP_REALTIME;
   std::size_t ask_streams(TimeNs now_ns, AutopilotLink& link, std::span<std::uint8_t> out) WASP_REALTIME;
   std::size_t read_parameter(std::size_t i, AutopilotLink& link, std::span<std::uint8_t> out) WASP_REALTIME;
+  std::size_t write_parameter(TimeNs now_ns, AutopilotLink& link, std::span<std::uint8_t> out) WASP_REALTIME;
   void take_parameter(const mavlink::ParamValue& value) WASP_REALTIME;
   void measure_attitude(TimeNs now_ns) WASP_REALTIME;
   void conclude() WASP_REALTIME;
@@ -82,7 +83,7 @@ class AutopilotSetup {
   Verdict verdict_;
   Readings readings_{};
   std::array<Question, kMostParameters> questions_{};
-  Question version_question_;
+  Question version_question_, write_question_;
   ParameterEncoding encoding_;
   bool version_known_ = false, concluded_ = false, conclusion_told_ = true, heard_told_ = false;
   TimeNs streams_due_ns_ = 0, refresh_due_ns_ = 0, window_from_ns_ = kNever;

@@ -60,6 +60,7 @@ class Autopilot {
   std::map<std::string, int> asked;
   std::vector<std::uint32_t> intervals;
   int old_streams = 0;
+  bool takes_writes = false;
 
  private:
   static SetupWish with(SetupWish wish, Flavour flavour) {
@@ -86,6 +87,14 @@ class Autopilot {
         v.capabilities = capability_of(facts_of(flavour_).encoding);
         answer(v);
       }
+    }
+    if (f.is<mavlink::ParamSet>() && takes_writes) {
+      const auto m = f.as<mavlink::ParamSet>();
+      auto& row = parameters.at(std::string(name_of(m.param_id)));
+      row.value = decode_parameter(facts_of(flavour_).encoding, m.param_type, m.param_value).value();
+      mavlink::ParamValue v;
+      v.param_id = m.param_id, v.param_type = row.type, v.param_value = m.param_value;
+      answer(v);
     }
     if (!f.is<mavlink::ParamRequestRead>()) return;
     const std::string name(name_of(f.as<mavlink::ParamRequestRead>().param_id));
@@ -225,6 +234,19 @@ TEST(AutopilotSetup, ThrustIsThrustOnlyWhereThatVersionSaysSo) {
   EXPECT_EQ(vertical(0x04010000, 0, 4), kThrust) << "4.1-dev";
   EXPECT_EQ(vertical(0x04010000, 1077936128, 0), kClimb) << "a default that was never set";
   EXPECT_EQ(vertical(0x04010000, 8, 0), -1) << "cannot be told: refused";
+}
+
+TEST(AutopilotSetup, AValueThatMeansNothingIsWrittenExplicitly) {
+  Autopilot a(Flavour::kArduPilot);
+  a.version = 0x04010000;
+  a.takes_writes = true;
+  a.parameters["GUID_OPTIONS"] = {520, 6};
+  a.parameters["DEV_OPTIONS"] = {0, 6};
+  a.run(8);
+  EXPECT_EQ(a.parameters["GUID_OPTIONS"].value, 512);
+  EXPECT_EQ(a.setup().bar(), SetupBar::kNone);
+  EXPECT_EQ(a.setup().semantics().vertical, VerticalChannel::kClimbRate);
+  EXPECT_TRUE(a.said("GUID_OPTIONS = 512"));
 }
 
 TEST(AutopilotSetup, TheWrongAutopilotIsNamed) {
