@@ -24,7 +24,7 @@ struct FlavourFacts {
 };
 
 inline constexpr std::array kFlavours{
-    FlavourFacts{"wasp", 1, ParameterEncoding::kBytewise, 0, false},
+    FlavourFacts{"wasp", 1, ParameterEncoding::kCCast, 0, false},
     FlavourFacts{"px4", 6, ParameterEncoding::kBytewise, 1500 * kMillisecond, true},  // PX4_CUSTOM_MAIN_MODE_OFFBOARD
     FlavourFacts{"ardupilot", 20, ParameterEncoding::kCCast, 0, true},                // Mode::Number::GUIDED_NOGPS
 };

@@ -165,7 +165,7 @@ TEST_F(ConfigTest, TwoCamerasWithLensesOfTheirOwn) {
   EXPECT_FALSE(shipped.camera_down.enabled);
   EXPECT_NE(error_of("[camera]\nlens = \"mirror\"\n").find("fisheye"), std::string::npos);
   EXPECT_NE(error_of("[camera_down]\nfisheye_k = [1.0]\n").find("fisheye_k"), std::string::npos);
-  EXPECT_NE(error_of("[camera_down]\ndriver = \"sim\"\n").find("driver"), std::string::npos);
+  EXPECT_NE(error_of("[camera_down]\ndriver = \"replay\"\n").find("driver"), std::string::npos);
 }
 
 TEST_F(ConfigTest, UnknownKeyNamesFileAndLine) {
