@@ -3,6 +3,7 @@
 
 #include <cstdio>
 
+#include "calibration/calibrate_delay.h"
 #include "calibration/calibrate_heading_rate.h"
 #include "calibration/image_turns.h"
 #include "tests/calibration/simulated_run.h"
