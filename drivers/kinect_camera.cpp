@@ -122,10 +122,11 @@ class KinectCamera final : public CameraDriver {
       const TimeNs now_ns = rt::now();
       if (pairs_.waiting() && now_ns >= patience_ends_ns_) release_waiting();
       if (came_ != FrameEvent::kTimeout) return came_;
+      if (std::exchange(damaged_, false)) return FrameEvent::kCorrupt;  // if need be after the frame that came with it
       if (depth_stream_.stuck(now_ns) || video_stream_.stuck(now_ns)) return FrameEvent::kGone;
       const TimeNs until_ns = pairs_.waiting() ? std::min(deadline_ns, patience_ends_ns_) : deadline_ns;
       if (!device_->process(std::max<DurationNs>(0, until_ns - now_ns))) return FrameEvent::kGone;
-      if (came_ == FrameEvent::kTimeout && rt::now() >= deadline_ns) return FrameEvent::kTimeout;
+      if (came_ == FrameEvent::kTimeout && !damaged_ && rt::now() >= deadline_ns) return FrameEvent::kTimeout;
     }
   }
 
@@ -202,7 +203,7 @@ class KinectCamera final : public CameraDriver {
     dated.stamp.estimated = !clock_.add(ticks, now_ns);
     dated.stamp.exposed_at_ns = (dated.stamp.estimated ? now_ns : clock_.to_local(ticks)) - readout_ns;
     if (!packets.whole() || dated.place_ns <= stream.last_place_ns) {
-      if (came_ == FrameEvent::kTimeout) came_ = FrameEvent::kCorrupt;
+      damaged_ = true;
       return std::nullopt;
     }
     stream.last_place_ns = dated.place_ns;
@@ -289,6 +290,7 @@ class KinectCamera final : public CameraDriver {
   std::uint32_t last_sequence_ = 0;
   bool streaming_ = false;
   FrameEvent came_ = FrameEvent::kTimeout;
+  bool damaged_ = false;  ///< an image, not yet told
 };
 
 thread_local KinectCamera* KinectCamera::serving = nullptr;
