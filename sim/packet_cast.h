@@ -68,8 +68,8 @@ class PacketCast {
   void shade(const RayPacket& rays) {
     std::uint32_t waiting = 0;
     for (int i = 0; i < 16; ++i) {
-      const bool hit = packet_.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID;
-      const bool seen = rays.seen[i] != 0;
+      const bool seen = rays.seen[i] != 0;  // Embree's kernels without AVX-512 fill the lanes that were not asked for too
+      const bool hit = seen && packet_.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID;
       waiting |= (hit ? 1u : 0u) << i;
       hits_.range[i] = packet_.ray.tfar[i];
       range[i] = hit ? packet_.ray.tfar[i] : 0.f;
