@@ -151,7 +151,15 @@ TomlSection evidence_of(const std::vector<Trial>& trials, const std::vector<Kine
     if (!trial.fit) continue;
     const KinectDepthFit& f = *trial.fit;
     const auto n = static_cast<std::size_t>(drivers::coefficient_count(trial.kind));
-    t.numbers(key, std::span(f.model.coefficients).first(n));
+    const auto coefficients = std::span(f.model.coefficients).first(n);
+    const std::array figures{f.rms_m, f.rms_share, f.held_out_share, f.worst_sigma_share(points), f.chi2_per_freedom};
+    const auto finite = [](double v) { return std::isfinite(v); };
+    if (!std::all_of(coefficients.begin(), coefficients.end(), finite) ||
+        !std::all_of(figures.begin(), figures.end(), finite)) {
+      t.flag(key + "_diverged", true);
+      continue;
+    }
+    t.numbers(key, coefficients);
     t.number(key + "_rms_m", f.rms_m).number(key + "_rms_share", f.rms_share);
     t.number(key + "_held_out_share", f.held_out_share, "of distances the fit did not see");
     t.number(key + "_worst_sigma_share", f.worst_sigma_share(points), "within the range, one standard deviation");

@@ -120,7 +120,7 @@ TEST(CalibrateCamera, FisheyeThroughOurOwnLensModel) {
   expect_found(s, "fy_px", static_cast<double>(lens.intrinsics.fy_px), 1.0);
   expect_found(s, "cx_px", static_cast<double>(lens.intrinsics.cx_px), 1.0);
   expect_found(s, "cy_px", static_cast<double>(lens.intrinsics.cy_px), 1.0);
-  EXPECT_LT(s.residual_rms, 0.15);
+  EXPECT_LT(s.residual_rms, 0.2);
   const auto file = folder.path / "fisheye.toml";
   write_solution(s, "camera", file);
   EXPECT_EQ(scheduling::load_config({file.string()}, {}).camera.lens_kind, LensKind::kFisheye);
