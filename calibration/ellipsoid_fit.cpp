@@ -13,6 +13,7 @@ namespace {
 using Eigen::Matrix3d, Eigen::MatrixXd, Eigen::Vector3d, Eigen::VectorXd;
 using Samples = std::vector<EllipsoidSample>;
 
+constexpr double kLeastEigenvalueShare = 1e-2, kFarthestNeutral = 2.0;  ///< of a sensor that measures at all
 constexpr int kDraws = 600;
 constexpr double kSpoilt = 0.2;  ///< of the median residual of the fit to all
 constexpr int kIterations = 60;
@@ -100,13 +101,14 @@ std::optional<Parameters> algebraic(const std::vector<const EllipsoidSample*>& s
   if (cross_axis)
     for (int k = 0; k < 3; ++k) A(kCross[k].first, kCross[k].second) = A(kCross[k].second, kCross[k].first) = q[6 + k];
   const Eigen::SelfAdjointEigenSolver<Matrix3d> eigen(A);
-  if (!(eigen.eigenvalues()[0] > 1e-6)) return std::nullopt;
+  if (!(eigen.eigenvalues()[0] > kLeastEigenvalueShare * eigen.eigenvalues()[2])) return std::nullopt;
   Parameters p;
   p.neutral = -0.5 * A.ldlt().solve(q.segment<3>(3));
   const double scale = 1 + p.neutral.dot(A * p.neutral);
   if (!(scale > 0)) return std::nullopt;
   p.K = eigen.operatorSqrt() / std::sqrt(scale);
-  return p.K.allFinite() && p.neutral.allFinite() ? std::optional(p) : std::nullopt;
+  // A nearly flat ellipsoid about a far centre passes by all readings (values are scaled to the unit sphere here).
+  return p.K.allFinite() && p.neutral.norm() < kFarthestNeutral ? std::optional(p) : std::nullopt;
 }
 
 double median_residual(const Parameters& p, const Samples& samples) {
