@@ -22,8 +22,8 @@ std::size_t whole_characters(std::string_view text, std::size_t most) noexcept {
 }  // namespace
 
 bool TextSender::offer(std::uint8_t severity, std::string_view text, TimeNs now_ns) WASP_REALTIME {
-  text = text.substr(0, std::min(text.find('\0'), text.size()));
-  text = text.substr(0, whole_characters(text, kLongest));
+  text = {text.data(), std::min(text.find('\0'), text.size())};
+  text = {text.data(), whole_characters(text, kLongest)};
   if (text.empty()) return false;
   const std::uint64_t hash = hash_of(severity, text);
   const bool repeats = std::any_of(said_.begin(), said_.end(), [&](const Said& s) noexcept {
