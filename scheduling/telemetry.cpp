@@ -5,6 +5,7 @@
 
 #include "scheduling/flow_ring.h"
 #include "scheduling/parameter_table.h"
+#include "scheduling/version.h"
 #include "shm/topics.h"
 #include "vision/time_to_contact.h"
 
@@ -209,7 +210,7 @@ std::size_t Telemetry::version(std::span<std::uint8_t> out) WASP_REALTIME {
   version_asked_ = false;
   AutopilotVersion m;
   m.capabilities = mav_protocol_capability::kMavlink2 | drivers::capability_of(parameters_.encoding());
-  m.flight_sw_version = WASP_VERSION_MAJOR << 24 | WASP_VERSION_MINOR << 16 | WASP_VERSION_PATCH << 8;
+  m.flight_sw_version = kVersion;
   return link_.encode(m, out);
 }
 

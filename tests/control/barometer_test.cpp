@@ -91,7 +91,7 @@ TEST(BarometerInControl, CuesThatComeLateDoNotTeachAZeroThatLags) {
   for (int i = 1; i < 160; ++i) {
     in.now_ns = i * 50 * kMillisecond;
     in.attitude.exposed_at_ns = in.now_ns;
-    in.autopilot = {in.now_ns, i > 4, i > 4};
+    in.autopilot = {in.now_ns, i > 4, i > 4, {}};
     in.pressure_hpa = pressure_at(100.f + height_at(in.now_ns));
     if (i % 4 == 0) {  // one cue for four ticks, 50 to 200 ms old
       cue.exposed_at_ns = in.now_ns - 50 * kMillisecond;

@@ -35,7 +35,7 @@ ControlInput good_input(TimeNs now_ns) {
   in.attitude.exposed_at_ns = now_ns - 5 * kMillisecond;
   in.accel_present = true;
   in.accel_body_mps2 = {0, 0, -9.80665f};
-  in.autopilot = {now_ns - 5 * kMillisecond, true, true};
+  in.autopilot = {now_ns - 5 * kMillisecond, true, true, {}};
   return in;
 }
 

@@ -189,7 +189,7 @@ INSTANTIATE_TEST_SUITE_P(Table, Refuses,
                                            Refusal{Flavour::kArduPilot, "FRAME_CLASS", 0, "set it to 1"},
                                            Refusal{Flavour::kArduPilot, "GUID_TIMEOUT", 20, "set it to 1"},
                                            Refusal{Flavour::kArduPilot, "ANGLE_MAX", 1000, "max_tilt_deg"}),
-                         [](const auto& info) { return std::string(info.param.name); });
+                         [](const auto& of) { return std::string(of.param.name); });
 
 TEST(AutopilotSetup, AnotherGroundStationAloneIsHeard) {
   Autopilot a(Flavour::kArduPilot);

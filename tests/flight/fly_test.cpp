@@ -329,8 +329,8 @@ TEST_P(FlyAs, TheSameProgramWithNothingButItsConfiguration) {
 INSTANTIATE_TEST_SUITE_P(Autopilots, FlyAs,
                          ::testing::Values(OtherAutopilot{"px4", false}, OtherAutopilot{"px4", true},
                                            OtherAutopilot{"ardupilot", false}, OtherAutopilot{"ardupilot", true}),
-                         [](const auto& info) {
-                           return std::string(info.param.flavour) + (info.param.udp ? "_udp" : "_serial");
+                         [](const auto& of) {
+                           return std::string(of.param.flavour) + (of.param.udp ? "_udp" : "_serial");
                          });
 
 TEST(FlyRefuses, AnAutopilotThatIsNotTheOneConfigured) {

@@ -104,9 +104,9 @@ INSTANTIATE_TEST_SUITE_P(Autopilots, LockstepAs,
                          ::testing::Values(OtherAutopilot{Flavour::kPx4, 1}, OtherAutopilot{Flavour::kPx4, 77},
                                            OtherAutopilot{Flavour::kArduPilot, 1},
                                            OtherAutopilot{Flavour::kArduPilot, 77}),
-                         [](const auto& info) {
-                           return std::string(drivers::facts_of(info.param.flavour).name) + "_" +
-                                  std::to_string(info.param.seed);
+                         [](const auto& of) {
+                           return std::string(drivers::facts_of(of.param.flavour).name) + "_" +
+                                  std::to_string(of.param.seed);
                          });
 
 TEST(Lockstep, SameSeedSameFlightToTheBit) {

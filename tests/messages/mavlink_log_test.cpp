@@ -70,7 +70,9 @@ TEST(MavlinkLog, KindsAreToldFromContent) {
     EXPECT_EQ(log.kind, kind);
     EXPECT_EQ(log.stream, joined(frames));
     EXPECT_EQ(log.stamps.size(), order == Order::kNone ? 0u : frames.size());
-    if (order != Order::kNone) EXPECT_EQ(log.time_us(frames[0].size()), kTime_us + 253'254);
+    if (order != Order::kNone) {
+      EXPECT_EQ(log.time_us(frames[0].size()), kTime_us + 253'254);
+    }
   }
 }
 

@@ -90,7 +90,9 @@ TEST_P(RecordedLog, EveryFrameAsPublished) {
                      std::to_string(f.id), std::to_string(f.length)};
     EXPECT_EQ(got, Row(want[i].begin() + 3, want[i].begin() + 8)) << "frame " << i;
     EXPECT_EQ(f.version, want[i][2] == "0xFD" ? 2 : 1) << "frame " << i;
-    if (log_.kind == LogKind::kTlog) EXPECT_EQ(log_.time_us(f.begin), std::stoull(want[i][1])) << "frame " << i;
+    if (log_.kind == LogKind::kTlog) {
+      EXPECT_EQ(log_.time_us(f.begin), std::stoull(want[i][1])) << "frame " << i;
+    }
   }
 }
 

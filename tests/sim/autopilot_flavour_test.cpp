@@ -195,7 +195,7 @@ TEST_P(BothFlavours, ForgetsWhatWasAskedWhenItIsStartedAgainAndIsAskedAgain) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Autopilots, BothFlavours, ::testing::Values(Flavour::kPx4, Flavour::kArduPilot),
-                         [](const auto& info) { return std::string(facts_of(info.param).name); });
+                         [](const auto& of) { return std::string(facts_of(of.param).name); });
 
 TEST(SimulatedPx4, RefusesOffboardWithoutAStream) {
   Companion c(Flavour::kPx4);

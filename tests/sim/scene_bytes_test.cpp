@@ -41,8 +41,8 @@ TEST_P(BytesOfAScene, ComesBackToTheBit) {
 }
 
 INSTANTIATE_TEST_SUITE_P(EveryKind, BytesOfAScene, testing::ValuesIn(scene_kinds().begin(), scene_kinds().end()),
-                         [](const auto& info) {
-                           std::string name = info.param.name;
+                         [](const auto& of) {
+                           std::string name = of.param.name;
                            std::replace(name.begin(), name.end(), '-', '_');
                            return name;
                          });
