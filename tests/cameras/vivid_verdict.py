@@ -32,16 +32,19 @@ def main(path):
         run = figures.get(name, [{}])[0]
         frames, period_ms = run.get("frames", 0), run.get("interval_p50_ns", 0) * 1e-6
         check(f"{name}: SCHED_FIFO, locked memory", run.get("real_time"), run.get("real_time") is True)
-        check(f"{name}: frames in 5 s at {rate} Hz", frames, abs(frames - 5 * rate) <= 3)
-        check(f"{name}: dropped, damaged, late", [run.get(k) for k in ("dropped", "corrupt", "timeouts")],
-              all(run.get(k) == 0 for k in ("dropped", "corrupt", "timeouts")))
-        # vivid says when a frame will have ended, 0.9 periods after it hands it out
-        wrong = frames if name == "grey" else 0
-        check(f"{name}: time stamps not believed", run.get("estimated"), run.get("estimated") == wrong)
+        check(f"{name}: frames in 5 s at {rate} Hz", frames, abs(frames - 5 * rate) <= 5)
+        check(f"{name}: damaged, late", [run.get(k) for k in ("corrupt", "timeouts")],
+              all(run.get(k) == 0 for k in ("corrupt", "timeouts")))
+        # vivid counts frames by ticks of 4 ms: at 60 Hz it passes over a number now and then, with no frame behind it
+        check(f"{name}: dropped", run.get("dropped"), 0 <= run.get("dropped", -1) <= (2 if name == "grey" else 0))
+        # vivid says when a frame will have ended, 0.9 periods after it hands it out; only its first is not ahead of us
+        wrong = range(frames - 1, frames + 1) if name == "grey" else (0,)
+        check(f"{name}: time stamps not believed", run.get("estimated"), run.get("estimated") in wrong)
         check(f"{name}: period by its time stamps [ms]", f"{period_ms:.2f}", abs(period_ms - 1000 / rate) < 0.04 * 1000 / rate)
-        check(f"{name}: stamp to publication p50 / max [ms]",
-              f"{run.get('latency_p50_ns', 0) * 1e-6:.3f} / {run.get('latency_max_ns', 0) * 1e-6:.3f}",
-              0 < run.get("latency_max_ns", 0) < 40e6)
+        # the first frame waits in the queue until the second is there
+        latency_ms = [run.get(f"latency_{k}_ns", 1e9) * 1e-6 for k in ("p50", "p99", "max")]
+        check(f"{name}: stamp to publication p50 / p99 / max [ms]", " / ".join(f"{t:.3f}" for t in latency_ms),
+              0 < latency_ms[0] and latency_ms[1] < 5 and latency_ms[2] < 1000 / rate + 5)
     run = figures.get("drops", [{}])[0]
     total = run.get("frames", 0) + run.get("dropped", 0)
     check("drops: seen in the sequence", run.get("dropped"), run.get("dropped", 0) >= 5)
