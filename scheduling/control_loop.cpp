@@ -41,8 +41,9 @@ ControlLoop::ControlLoop(const Config& config, const ControlWiring& wiring)
 
 void ControlLoop::run(LoopControl& control) {
   RealtimeLoop loop(control, *wiring_.watch);
-  rt::PeriodicGrid grid(rt::now() + config_.control_period_ns, config_.control_period_ns,
-                        config_.control_thread.overrun);
+  // The threads beside it settle first; but a flight that was started again is waited for.
+  const DurationNs settle_ns = control.status->incarnation > 0 ? kMillisecond : config_.control_period_ns;
+  rt::PeriodicGrid grid(rt::now() + settle_ns, config_.control_period_ns, config_.control_thread.overrun);
   while (loop.tick() && !mission_over_.load(std::memory_order_relaxed)) tick(rt::wait_next(grid), control);
   last_beat();
 }

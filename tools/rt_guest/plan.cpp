@@ -52,10 +52,12 @@ Plan plan_boot(const std::string& arch, const Cycles& cycles) {
   return plan;
 }
 
-Plan plan_faults(const std::string& arch) {
+Plan plan_faults(const std::string& arch, const std::string& only) {
   Plan plan{.arch = arch, .jobs = {}, .bars = {}};
-  plan.jobs.push_back(
-      {.name = "faults", .kind = JobKind::kFaults, .faults = kAllFaults, .fault_count = kAllFaultCount});
+  plan.jobs.push_back({.name = "faults",
+                       .kind = JobKind::kFaults,
+                       .faults = only.empty() ? kAllFaults : only,
+                       .fault_count = only.empty() ? kAllFaultCount : 1});
   return plan;
 }
 

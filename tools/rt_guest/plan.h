@@ -56,8 +56,9 @@ struct Cycles {
 /// arm64: rights, the quiet flight, faults, the stressed flight, and the negative control: the same binary and load
 /// without real time. amd64: rights, the quiet flight, faults, the board's watchdog.
 Plan plan_boot(const std::string& arch, const Cycles& cycles);
-/// Every kind of fault that a flight on replayed frames with one core can show.
-Plan plan_faults(const std::string& arch);
+/// Every kind of fault that a flight on replayed frames with one core can show; or those whose names `only`, a regular
+/// expression without spaces, finds.
+Plan plan_faults(const std::string& arch, const std::string& only = {});
 /// What needs a second core: one is taken away in flight.
 Plan plan_two_cores(const std::string& arch);
 

@@ -24,14 +24,14 @@ namespace fs = std::filesystem;
 constexpr int kUnavailable = 77;  // CTest: skipped
 
 struct Options {
-  std::string arch = "arm64", json;
+  std::string arch = "arm64", only, json;
   bool full = false, short_form = false, stress = false, faults = false, two_cores = false;
   std::int64_t cycles = 0, stress_cycles = 0;
   double patience_s = 600;
 };
 
 Plan plan_of(const Options& o) {
-  if (o.faults) return plan_faults(o.arch);
+  if (o.faults) return plan_faults(o.arch, o.only);
   if (o.two_cores) return plan_two_cores(o.arch);
   Cycles cycles;
   if (o.full) cycles = {.quiet = 36'000, .stressed = 2'400, .not_real_time = 200};
@@ -104,9 +104,13 @@ std::optional<int> parse(int argc, char** argv, Options& o) {
   app.add_option("--stress-cycles", o.stress_cycles, "control cycles under stress-ng (0: as the form says)")
       ->check(CLI::Range(0, 10'000'000));
   app.add_flag("--stress", o.stress, "as many cycles under stress-ng as in the quiet flight");
-  app.add_flag("--faults", o.faults,
-               "instead: every kind of fault that a flight on replayed frames can show, on virtual time")
-      ->excludes(full);
+  auto* faults =
+      app.add_flag("--faults", o.faults,
+                   "instead: every kind of fault that a flight on replayed frames can show, on virtual time")
+          ->excludes(full);
+  app.add_option("--only", o.only, "of those, the ones whose names this regular expression finds")
+      ->needs(faults)
+      ->check([](const std::string& text) { return text.find(' ') == text.npos ? "" : "no spaces, please"; });
   app.add_flag("--two-cores", o.two_cores, "instead: a core is taken away in flight; its times mean nothing")
       ->excludes(full);
   app.add_option("--json", o.json, "write all figures to this file");

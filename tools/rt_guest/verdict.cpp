@@ -101,7 +101,9 @@ void judge_faults(const Job& job, const nlohmann::json& f, std::vector<Result>& 
       const auto ms = [&](const char* key) {
         return cell.contains(key) && cell[key].is_number() ? cell[key].get<double>() : 0;
       };
-      out.push_back({std::move(name), ms("response_ms"), "ms", "promise kept", verdict == "ok"});
+      std::string bar = "promise kept";
+      if (ms("recovered_ms") > 0) bar += fmt::format("; back after {:.0f} ms", ms("recovered_ms"));
+      out.push_back({std::move(name), ms("response_ms"), "ms", std::move(bar), verdict == "ok"});
     }
   out.push_back(at_least(job.name + ": faults done", tried, job.fault_count));
 }
