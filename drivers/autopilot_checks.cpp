@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "types/units.h"
+
 namespace wasp::drivers {
 namespace {
 
@@ -145,7 +147,7 @@ Verdict judge_copter(const CheckContext& c, const Readings& r) noexcept {
                         "the last setpoint would be flown on for so long after the stream ended; set it to 1");
   if (known(r, kAngleMax_cdeg) && at(r, kAngleMax_cdeg).value > 0) {
     const double degrees = at(r, kAngleMax_cdeg).value / 100,
-                 wanted = static_cast<double>(c.wish.max_tilt_rad) * 57.29578;
+                 wanted = to_degrees(Radians{c.wish.max_tilt_rad}).value;
     if (degrees < wanted - 0.05)
       v.refusal = because("ANGLE_MAX", at(r, kAngleMax_cdeg).value,
                           "less than control.max_tilt_deg, commands would be cut; raise it, or lower that");

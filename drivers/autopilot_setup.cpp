@@ -4,7 +4,7 @@ namespace wasp::drivers {
 namespace {
 
 constexpr DurationNs kWindow = kSecond;  ///< over which the rate of attitudes is counted
-constexpr std::uint16_t kRequestMessage = 512, kRequestCapabilities = 520;  ///< the second for releases before 2021
+constexpr std::uint16_t kRequestCapabilities = 520;  ///< MAV_CMD_REQUEST_MESSAGE in releases before 2021
 
 /// A message to be sent by itself, and how often.
 struct StreamRow {
@@ -161,7 +161,7 @@ std::size_t AutopilotSetup::next_question(TimeNs now_ns, AutopilotLink& link,
 std::size_t AutopilotSetup::ask_version(TimeNs now_ns, AutopilotLink& link, std::span<std::uint8_t> out) WASP_REALTIME {
   if (version_known_ || version_question_.tries >= kTries || !due(version_question_, now_ns)) return 0;
   const bool newer = version_question_.tries % 2 == 1;
-  const std::uint16_t command = newer ? kRequestMessage : kRequestCapabilities;
+  const std::uint16_t command = newer ? mavlink::mav_cmd::kRequestMessage : kRequestCapabilities;
   return link.encode_command(command, {newer ? float{mavlink::AutopilotVersion::kId} : 1.f}, 0, out);
 }
 
@@ -248,9 +248,9 @@ bool AutopilotSetup::take_news(TextLine& line, bool& verdict) WASP_REALTIME {
     } else {
       line << "the autopilot says MAV_AUTOPILOT " << static_cast<double>(status_.autopilot)
            << ", autopilot.flavour says " << facts_of(context_.wish.flavour).name << ": set it to "
-           << (status_.autopilot == 12  ? "px4"
-               : status_.autopilot == 3 ? "ardupilot"
-                                        : "what it is");
+           << (fits(Flavour::kPx4, status_.autopilot)         ? "px4"
+               : fits(Flavour::kArduPilot, status_.autopilot) ? "ardupilot"
+                                                              : "what it is");
     }
     return true;
   }

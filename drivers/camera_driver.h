@@ -105,7 +105,15 @@ class CameraDriver {
   /// Finds and configures the device: the one asked for, and after a first success that very one again, wherever it is
   /// plugged in. Throws CameraError, with nothing left open. A device that delivers another size than asked for is the
   /// caller's to refuse.
-  virtual CameraFormat open() = 0;
+  CameraFormat open() {
+    close();
+    try {
+      return configure();
+    } catch (...) {
+      close();
+      throw;
+    }
+  }
   /// Frames flow from here on. The sink outlives close(). Throws CameraError.
   virtual void start(FrameSink& sink) = 0;
   /// Waits for one frame and publishes it. When several wait, old ones may be passed over for the newest.
@@ -114,6 +122,10 @@ class CameraDriver {
   virtual void close() noexcept = 0;
   /// What only this kind counts, since start(); for people. Empty: nothing.
   [[nodiscard]] virtual std::string account() const { return {}; }
+
+ private:
+  /// open(), from a closed device; what it left open when it throws is closed by the caller.
+  virtual CameraFormat configure() = 0;
 };
 
 /// A camera that is plugged in.

@@ -47,17 +47,6 @@ class Dc1394Camera final : public CameraDriver {
   explicit Dc1394Camera(const CameraRequest& request) : request_(request) {}
   ~Dc1394Camera() override { close(); }
 
-  CameraFormat open() override {
-    close();
-    bus_.emplace();
-    try {
-      return configure();
-    } catch (...) {
-      close();
-      throw;
-    }
-  }
-
   void start(FrameSink& sink) override {
     sink_ = &sink;
     device_->demand(dc1394_capture_setup(device_->get(), static_cast<std::uint32_t>(request_.settings.buffers),
@@ -102,7 +91,8 @@ class Dc1394Camera final : public CameraDriver {
  private:
   enum class Wait { kReady, kTimeout, kGone };
 
-  CameraFormat configure() {
+  CameraFormat configure() override {
+    bus_.emplace();
     device_.emplace(*bus_, find_guid(*bus_, guid_, request_.settings.device));
     mode_ = set_mode(*device_, request_);
     const Dc1394Features features = set_features(*device_, request_);

@@ -78,18 +78,6 @@ class KinectCamera final : public CameraDriver {
   }
   ~KinectCamera() override { close(); }
 
-  CameraFormat open() override {
-    close();
-    if (library_ == nullptr) library_ = &freenect_library();
-    device_.emplace(*library_, serial_.empty() ? settings_.device : serial_);
-    try {
-      return configure();
-    } catch (...) {
-      close();
-      throw;
-    }
-  }
-
   void start(FrameSink& sink) override {
     sink_ = &sink;
     const FrameSlot slot = sink.slot();
@@ -160,7 +148,9 @@ class KinectCamera final : public CameraDriver {
     [[nodiscard]] bool stuck(TimeNs now_ns) const { return on && now_ns - heard_at_ns > kStuckNs; }
   };
 
-  CameraFormat configure() {
+  CameraFormat configure() override {
+    if (library_ == nullptr) library_ = &freenect_library();
+    device_.emplace(*library_, serial_.empty() ? settings_.device : serial_);
     const freenect_frame_mode depth = device_->set_depth(static_cast<freenect_depth_format>(depth_.format), depth_.name);
     const freenect_frame_mode video = device_->set_video(static_cast<freenect_video_format>(video_.format), video_.name);
     const bool infrared = video.video_format == FREENECT_VIDEO_IR_8BIT;

@@ -40,17 +40,6 @@ class V4l2Camera final : public CameraDriver {
   explicit V4l2Camera(const CameraRequest& request) : request_(request) {}
   ~V4l2Camera() override { close(); }
 
-  CameraFormat open() override {
-    close();
-    device_.emplace(find_camera(identity_, request_.settings.device).node);
-    try {
-      return configure();
-    } catch (...) {
-      close();
-      throw;
-    }
-  }
-
   void start(FrameSink& sink) override {
     sink_ = &sink;
     announce_ = [&sink] { sink.announce(); };
@@ -91,7 +80,8 @@ class V4l2Camera final : public CameraDriver {
   }
 
  private:
-  CameraFormat configure() {
+  CameraFormat configure() override {
+    device_.emplace(find_camera(identity_, request_.settings.device).node);
     const std::string& node = device_->identity().node;
     if (!device_->captures())
       throw CameraError(node, "captures no pictures through one plane", "see `wasp camera --list` for those that do");

@@ -10,8 +10,7 @@ namespace {
 constexpr std::uint8_t kSystem = 1, kComponent = 1;
 constexpr std::uint64_t kTicksPerSecond = 200;
 constexpr std::size_t kMaxQueued = 64 * 1024;
-constexpr std::uint16_t kCommandSetMode = 176, kCommandReboot = 246, kCommandArm = 400, kCommandFailure = 420,
-                        kCommandInterval = 511, kCommandRequestMessage = 512, kCommandClockStep = 31010;
+constexpr std::uint16_t kCommandClockStep = 31010;  ///< MAV_CMD_USER_1, of this simulator alone
 constexpr float kForce = 21196.f, kForceReboot = 20190226.f;
 constexpr DurationNs kRebootTime = 1500 * kMillisecond;
 constexpr std::uint8_t kIgnoreYawRate = 4, kIgnoreThrust = 64, kIgnoreAttitude = 128;
@@ -114,21 +113,21 @@ void AutopilotLink::handle(const mavlink::Frame& frame, TimeNs now_ns) {
 
 CommandResult AutopilotLink::obey(const mavlink::CommandLong& command, TimeNs now_ns) {
   switch (command.command) {
-    case kCommandArm:
+    case mavlink::mav_cmd::kComponentArmDisarm:
       return flight_.arm(command.param1 > 0.5f, command.param2 == kForce);
-    case kCommandSetMode:
+    case mavlink::mav_cmd::kDoSetMode:
       return command.param1 >= 1 ? set_mode(command.param2) : CommandResult::kDenied;
-    case kCommandRequestMessage:
+    case mavlink::mav_cmd::kRequestMessage:
       return command.param1 == float{mavlink::AutopilotVersion::kId} ? send_version(now_ns) : CommandResult::kDenied;
-    case kCommandReboot:
+    case mavlink::mav_cmd::kPreflightRebootShutdown:
       return reboot(command, now_ns);
-    case kCommandFailure:
+    case mavlink::mav_cmd::kInjectFailure:
       return failures_.set(command.param1, command.param2) ? CommandResult::kAccepted : CommandResult::kUnsupported;
     case kCommandClockStep:
       if (!(std::abs(command.param1) <= 1e9f)) return CommandResult::kDenied;
       clock_offset_ns_ += from_seconds(static_cast<double>(command.param1));
       return CommandResult::kAccepted;
-    case kCommandInterval:
+    case mavlink::mav_cmd::kSetMessageInterval:
       return set_interval(command.param1, command.param2);
     default:
       return CommandResult::kUnsupported;
@@ -228,7 +227,7 @@ void AutopilotLink::on_command(const mavlink::CommandLong& command, const mavlin
   ack.target_component = frame.component_id;
   send(ack);
   if (now_ns < silent_until_ns_) return;
-  if (!is(Flavour::kWasp) && command.command == kCommandArm && result == CommandResult::kTemporarilyRejected)
+  if (!is(Flavour::kWasp) && command.command == mavlink::mav_cmd::kComponentArmDisarm && result == CommandResult::kTemporarilyRejected)
     send_text(flight_.settled() ? "PreArm: not on the ground" : "PreArm: attitude estimate not settled", 4);
   send_heartbeat();  // the new state at once, not within a second
 }

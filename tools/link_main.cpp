@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "tools/link_session.h"
+#include "types/units.h"
 
 namespace {
 
@@ -53,9 +54,8 @@ int run(Options& o) {
   session.report();
   const auto error = flight.error();
   if (!error) return 1;
-  constexpr float kDegrees = 57.29578f;
   std::printf("attitude reached less commanded, mean of the last second: roll %.2f, pitch %.2f degrees\n",
-              static_cast<double>(error->first * kDegrees), static_cast<double>(error->second * kDegrees));
+              to_degrees(Radians{error->first}).value, to_degrees(Radians{error->second}).value);
   return 0;
 }
 
