@@ -24,7 +24,7 @@ control::ControlInput input_at(TimeNs now_ns, bool cue_present) {
   in.attitude_present = in.accel_present = true;
   in.attitude.exposed_at_ns = now_ns;
   in.accel_body_mps2 = {0, 0, -9.81f};
-  in.autopilot = {now_ns, true, true};
+  in.autopilot = {now_ns, true, true, {}};
   for (std::size_t i = 0; i < 2; ++i) {
     in.cues.present[i] = cue_present;
     in.cues.cues[i].exposed_at_ns = now_ns - 40 * kMillisecond;

@@ -79,6 +79,7 @@ function(wasp_test folder)
   set(target test_${folder})
   add_executable(${target} ${sources})
   target_link_libraries(${target} PRIVATE ${ARG_DEPENDS} wasp_options GTest::gtest_main)
+  target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O1>)  # run once
   target_compile_definitions(${target} PRIVATE WASP_SOURCE_DIR="${CMAKE_SOURCE_DIR}" WASP_BINARY_DIR="${CMAKE_BINARY_DIR}")
   gtest_discover_tests(${target} TEST_PREFIX "${folder}." DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 900 PROCESSORS ${ARG_PROCESSORS} RESOURCE_LOCK "${ARG_LOCK}")
 endfunction()

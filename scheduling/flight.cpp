@@ -449,7 +449,10 @@ int check_rights(int priority) {
 int flight_main(const BehaviourTable& behaviours, int argc, char** argv) {
   FlightOptions options;
   if (const auto code = parse_flight_options(argc, argv, options)) return *code;
-  if (options.check_rights) return check_rights(Config{}.control_thread.priority);
+  if (options.check_rights) {
+    const Config defaults;
+    return check_rights(defaults.control_thread.priority);
+  }
   const sigset_t signals = block_signals();
   shm::install_bus_guard();
   try {

@@ -15,7 +15,8 @@ if(WASP_CLANG AND NOT WASP_SANITIZE)
   add_custom_target(wasp_fuzz ALL
     COMMAND ${CMAKE_COMMAND} -S ${CMAKE_CURRENT_LIST_DIR} -B ${CMAKE_BINARY_DIR}/fuzz -G ${CMAKE_GENERATOR}
       -DCMAKE_CXX_COMPILER=${WASP_CLANG} -DWASP_GENERATED=${CMAKE_BINARY_DIR}/generated --log-level=WARNING
-    COMMAND ${CMAKE_COMMAND} --build ${CMAKE_BINARY_DIR}/fuzz -j 1
+    COMMAND ${CMAKE_COMMAND} --build ${CMAKE_BINARY_DIR}/fuzz -j 2
+    USES_TERMINAL
     COMMENT "Fuzzers (clang-22, sanitizers)")
   add_dependencies(wasp_fuzz wasp_message_headers)
 endif()
