@@ -66,7 +66,7 @@ class Companion {
     ASSERT_EQ(arm(), 0);
     const bool climb = flavour_ == Flavour::kArduPilot;
     field = climb ? 0.6f : hover() * 1.08f;
-    for (int i = 0; i < 600 && height_m() < 2.f; ++i) run(0.05);
+    for (int i = 0; i < 600 && height_m() < 2.0; ++i) run(0.05);
     field = climb ? 0.5f : hover();
     ASSERT_GE(height_m(), 2.f);
     run(1.0);
