@@ -52,7 +52,7 @@ void TelemetryInbox::tell(std::uint8_t severity, std::string_view text) noexcept
 }
 
 Telemetry::Telemetry(const Config& c, const shm::Region& flight, drivers::AutopilotLink& link)
-    : link_(link), parameters_(parameter_table(c)), tell_texts_(c.telemetry.texts), bins_(bins_of(c)) {
+    : link_(link), parameters_(parameter_table(c)), own_(c, flight, link), tell_texts_(c.telemetry.texts), bins_(bins_of(c)) {
   const TelemetryConfig& t = c.telemetry;
   const auto set = [&](Kind kind, std::uint32_t id, double rate_hz) {
     streams_[kind].id = id;
@@ -63,6 +63,10 @@ Telemetry::Telemetry(const Config& c, const shm::Region& flight, drivers::Autopi
   set(kFlow, OpticalFlowRad::kId, t.optical_flow_hz);
   set(kHeight, NamedValueFloat::kId, t.named_values_hz);
   set(kContact, NamedValueFloat::kId, t.named_values_hz);
+  set(kCues, WaspCue::kId, t.cues_hz);
+  set(kLatencies, WaspLatency::kId, t.latencies_hz);
+  set(kState, WaspState::kId, t.state_hz);
+  set(kField, WaspFlow::kId, t.flow_field_hz);
   ground_flow_ = voice(c, flight, vision::GroundFlow::kName);
   ground_ = voice(c, flight, "ground_altitude");
   contact_ = voice(c, flight, vision::TimeToContactFront::kName);
@@ -83,11 +87,6 @@ Telemetry::Voice Telemetry::voice(const Config& c, const shm::Region& flight, st
     voice.age_limit_ns = c.control.arbiter.rows[i].age_limit_ns;
   }
   return voice;
-}
-
-/// Autopilot's time where the clocks are matched, else ours: the magnitude tells.
-TimeNs Telemetry::autopilot_time(TimeNs local_ns) const WASP_REALTIME {
-  return link_.clock().synced() ? link_.clock().to_remote(local_ns) : local_ns;
 }
 
 bool Telemetry::receive(const Frame& frame, TimeNs now_ns) WASP_REALTIME {
@@ -178,6 +177,7 @@ std::size_t Telemetry::next(TimeNs now_ns, LineGate& gate, std::span<std::uint8_
     if (!s.due(now_ns) || !gate.affords(size_of(s.id), now_ns)) continue;
     const std::size_t n = stream(static_cast<Kind>(i), now_ns, out);
     if (n == 0) continue;  // nothing to be said of it now
+    if (i == kField && own_.field_begun()) return n;  // its other parts follow as soon as there is room
     s.once = false;
     s.due_ns = s.due_ns + s.interval_ns > now_ns ? s.due_ns + s.interval_ns : now_ns + s.interval_ns;
     return n;
@@ -226,6 +226,14 @@ std::size_t Telemetry::stream(Kind kind, TimeNs now_ns, std::span<std::uint8_t> 
       return height(now_ns, out);
     case kContact:
       return contact(now_ns, out);
+    case kCues:
+      return own_.cue(out);
+    case kLatencies:
+      return own_.latency(now_ns, out);
+    case kState:
+      return own_.state(out);
+    case kField:
+      return own_.flow(now_ns, out);
     case kKinds:
       break;
   }
@@ -237,7 +245,7 @@ std::size_t Telemetry::computer(TimeNs now_ns, std::span<std::uint8_t> out) WASP
   if (!inbox_.computer.load(m)) return 0;
   const TimeNs read_at_ns = static_cast<TimeNs>(m.uptime) * kMillisecond;
   if (now_ns - read_at_ns > kComputerStale) return 0;
-  m.time_usec = microseconds(autopilot_time(read_at_ns));
+  m.time_usec = microseconds(told_time(link_, read_at_ns));
   return link_.encode(m, out);
 }
 
@@ -256,7 +264,7 @@ std::size_t Telemetry::obstacles(TimeNs now_ns, std::span<std::uint8_t> out) WAS
   obstacles_sent_ = sample.number;
   if (!bins.valid) return 0;
   ObstacleDistance m;
-  m.time_usec = microseconds(autopilot_time(shown_at_ns - interval_ns));
+  m.time_usec = microseconds(told_time(link_, shown_at_ns - interval_ns));
   m.distances = bins.distance_cm;
   m.min_distance = static_cast<std::uint16_t>(std::lround(100.f * bins_.least_m));
   m.max_distance = static_cast<std::uint16_t>(std::lround(100.f * bins_.greatest_m));
@@ -276,7 +284,7 @@ std::size_t Telemetry::flow(TimeNs now_ns, std::span<std::uint8_t> out) WASP_REA
   const DurationNs integrated_ns = flow_sum_.until_ns() - flow_sum_.from_ns();
   if (integrated_ns < streams_[kFlow].interval_ns / 2 && !streams_[kFlow].once) return 0;
   OpticalFlowRad m;
-  m.time_usec = microseconds(autopilot_time(flow_sum_.until_ns()));
+  m.time_usec = microseconds(told_time(link_, flow_sum_.until_ns()));
   m.integration_time_us = static_cast<std::uint32_t>(integrated_ns / kMicrosecond);
   m.integrated_x = flow_sum_.flow_x_rad();
   m.integrated_y = flow_sum_.flow_y_rad();
@@ -306,7 +314,7 @@ std::size_t Telemetry::named(const char* name, float value, TimeNs exposed_at_ns
                              std::span<std::uint8_t> out) WASP_REALTIME {
   if (!std::isfinite(value)) return 0;
   NamedValueFloat m;
-  m.time_boot_ms = static_cast<std::uint32_t>(std::max<TimeNs>(0, autopilot_time(exposed_at_ns)) / kMillisecond);
+  m.time_boot_ms = static_cast<std::uint32_t>(std::max<TimeNs>(0, told_time(link_, exposed_at_ns)) / kMillisecond);
   m.value = value;
   for (std::size_t i = 0; i < m.name.size() && name[i] != '\0'; ++i) m.name[i] = name[i];
   return link_.encode(m, out);

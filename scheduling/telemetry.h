@@ -1,5 +1,5 @@
 // What wasp tells besides setpoints, on the autopilot's line: answers to commands and parameter requests, texts, the
-// computer's state, and what the behaviours see - OBSTACLE_DISTANCE, OPTICAL_FLOW_RAD, height and time to contact. The
+// computer's state, and what the behaviours see - OBSTACLE_DISTANCE, OPTICAL_FLOW_RAD, height and time to contact, and wasp's own messages. The
 // link thread speaks it, one frame at a time, when the line has room (scheduling/line_gate.h); what behaviours saw is
 // put together at that moment from their newest words and never older than their age limits: a blind behaviour makes
 // silence. Two inboxes are written by the main thread, which never waits for the link's and is never waited for.
@@ -20,6 +20,7 @@
 #include "scheduling/flow_integral.h"
 #include "scheduling/gyro_integral.h"
 #include "scheduling/line_gate.h"
+#include "scheduling/own_messages.h"
 #include "shm/broadcast_ring.h"
 #include "vision/kernels/obstacle_bins.h"
 
@@ -64,7 +65,7 @@ class Telemetry {
 
  private:
   static constexpr int kFramesPerServe = 6;
-  enum Kind : std::size_t { kComputer, kObstacles, kFlow, kHeight, kContact, kKinds };
+  enum Kind : std::size_t { kComputer, kObstacles, kFlow, kHeight, kContact, kCues, kLatencies, kState, kField, kKinds };
   struct Stream {
     std::uint32_t id = 0;
     DurationNs usual_ns = 0, interval_ns = 0;  ///< 0: not sent
@@ -94,7 +95,6 @@ class Telemetry {
   std::uint8_t set_interval(std::uint32_t id, float interval_us, TimeNs now_ns) WASP_REALTIME;
   void rate_changed(std::size_t row) WASP_REALTIME;
   [[nodiscard]] static bool fresh(const Voice& voice, TimeNs now_ns, Cue& cue) WASP_REALTIME;
-  [[nodiscard]] TimeNs autopilot_time(TimeNs local_ns) const WASP_REALTIME;
   Voice voice(const Config& config, const shm::Region& flight, std::string_view behaviour) const;
 
   drivers::AutopilotLink& link_;
@@ -102,6 +102,7 @@ class Telemetry {
   drivers::ParameterServer parameters_;
   drivers::TextSender texts_;
   drivers::AckQueue acks_;
+  OwnMessages own_;
   bool tell_texts_, version_asked_ = false;
   std::int32_t interval_asked_ = -1;  ///< id of a MESSAGE_INTERVAL to be told
   std::array<Stream, kKinds> streams_;

@@ -10,6 +10,10 @@ void read_telemetry(TomlTable t, TelemetryConfig& c) {
   t.number("obstacle_distance_hz", c.obstacle_distance_hz, 0, 50);
   t.number("optical_flow_hz", c.optical_flow_hz, 0, 50);
   t.number("named_values_hz", c.named_values_hz, 0, 50);
+  t.number("cues_hz", c.cues_hz, 0, 50);
+  t.number("latencies_hz", c.latencies_hz, 0, 50);
+  t.number("state_hz", c.state_hz, 0, 50);
+  t.number("flow_field_hz", c.flow_field_hz, 0, 50);
   t.number("position_hz", c.position_hz, 0, 200);
   t.number("obstacle_above_m", c.obstacle_above_m, 0.05, 10);
   t.number("obstacle_below_m", c.obstacle_below_m, 0.05, 10);

@@ -13,6 +13,7 @@ struct TelemetryConfig {
   std::string parameters = "auto";  ///< encoding of parameter values; auto: as the autopilot's flavour has it
   bool texts = true;                ///< STATUSTEXT
   double computer_status_hz = 1, obstacle_distance_hz = 10, optical_flow_hz = 10, named_values_hz = 2;  ///< 0: not
+  double cues_hz = 0, latencies_hz = 0, state_hz = 0, flow_field_hz = 0;  ///< wasp's own messages; behaviours in turn
   double obstacle_above_m = 0.4, obstacle_below_m = 0.4;  ///< of the camera: what stands between is in the way
   double position_hz = 0;  ///< of LOCAL_POSITION_NED, asked of the autopilot; 0: not asked for
   double obstacle_least_m = 0.3, obstacle_greatest_m = 4.0;

@@ -278,6 +278,146 @@ TEST_F(TelemetryTest, AnOldFieldIsNotTold) {
   EXPECT_TRUE(heard<ObstacleDistance>().empty());
 }
 
+TEST_F(TelemetryTest, OurOwnMessagesAreForThoseWhoAsk) {
+  write("ground_altitude", cue(0, 20 * kMillisecond));
+  FlowWriter(*flight_, shm::kFlow).publish(wall_on_the_left(config_.camera, now_ns_), now_ns_, now_ns_);
+  shm::RingWriter(*flight_, shm::kCommand, "Command").write(Command{}, now_ns_);
+  run_for(2 * kSecond);
+  EXPECT_TRUE(heard<WaspCue>().empty());
+  EXPECT_TRUE(heard<WaspState>().empty());
+  EXPECT_TRUE(heard<WaspFlow>().empty());
+  command(mav_cmd::kRequestMessage, WaspCue::kId);
+  command(mav_cmd::kRequestMessage, WaspState::kId);
+  command(mav_cmd::kRequestMessage, WaspLatency::kId);
+  run_for(kSecond);
+  EXPECT_EQ(heard<WaspCue>().size(), 1u);
+  EXPECT_EQ(heard<WaspState>().size(), 1u);
+  EXPECT_TRUE(heard<WaspLatency>().empty()) << "nothing has run";
+}
+
+TEST_F(TelemetryTest, CuesAreToldInTurnEachOnce) {
+  command(mav_cmd::kSetMessageInterval, WaspCue::kId, 20'000);
+  Cue ground = cue(0, 20 * kMillisecond);
+  ground.frame_sequence = 77, ground.finished_at_ns = ground.exposed_at_ns + 12'345'000;
+  ground.body.has_height = 1, ground.body.height_m = 0.5f, ground.body.height_sigma_m = 0.01f;
+  ground.body.has_climb = 1, ground.body.climb_1ps = -0.3f;
+  write("ground_altitude", ground);
+  Cue blind = cue(1, 20 * kMillisecond);
+  blind.body.validity = Validity::kBlind, blind.body.avoid = 1;
+  write("time_to_contact", blind);
+  run_for(kSecond);
+  const auto cues = heard<WaspCue>();
+  ASSERT_EQ(cues.size(), 2u);
+  const WaspCue& m = cues[0];
+  EXPECT_EQ(std::string(m.name.data()), "ground_altitude");
+  EXPECT_EQ(m.time_usec, static_cast<std::uint64_t>((kT0 - 20 * kMillisecond) / kMicrosecond));
+  EXPECT_EQ(m.frame_sequence, 77u);
+  EXPECT_EQ(m.latency_us, 12'345u);
+  EXPECT_EQ(m.valid, 1);
+  EXPECT_EQ(m.has, wasp_cue_has::kHeight | wasp_cue_has::kClimb);
+  EXPECT_FLOAT_EQ(m.height, 0.5f);
+  EXPECT_FLOAT_EQ(m.climb_slope, -0.3f);
+  EXPECT_EQ(std::string(cues[1].name.data()), "time_to_contact");
+  EXPECT_EQ(cues[1].behaviour, 1);
+  EXPECT_EQ(cues[1].valid, 0);
+  EXPECT_EQ(cues[1].has, wasp_cue_has::kAvoid);
+  ground.step_index = 1;
+  write("ground_altitude", ground);
+  run_for(kSecond);
+  EXPECT_EQ(heard<WaspCue>().size(), 3u);
+}
+
+TEST_F(TelemetryTest, LatenciesAreThoseOfTheTableOfStages) {
+  config_.telemetry.latencies_hz = 20;
+  start();
+  StageTable& table = stage_table(*flight_);
+  Stage* const compute = table.add("ground_flow", "compute", 2 * kMillisecond);
+  for (int i = 1; i <= 100; ++i) compute->record(i * 30 * kMicrosecond);
+  table.add("ground_flow", "end to end", 0)->record(40 * kMillisecond);
+  table.add("control", "compute", 0)->record(kMillisecond);
+  table.add("control", "tick to byte", 0)->record(3 * kMillisecond);
+  run_for(220 * kMillisecond);
+  const auto told = heard<WaspLatency>();
+  ASSERT_GE(told.size(), 4u);
+  EXPECT_EQ(std::string(told[0].name.data()), "ground_flow");
+  EXPECT_EQ(told[0].behaviour, 2);
+  EXPECT_EQ(told[0].samples, 100u);
+  EXPECT_EQ(told[0].over_budget, 34u);
+  EXPECT_NEAR(told[0].compute_p50, 1500, 50);
+  EXPECT_NEAR(told[0].compute_p99, 2970, 100);
+  EXPECT_FLOAT_EQ(told[0].compute_max, 3000);
+  EXPECT_FLOAT_EQ(told[0].end_to_end_max, 40'000);
+  EXPECT_FLOAT_EQ(told[0].wake_max, 0);
+  EXPECT_EQ(std::string(told[1].name.data()), "control");
+  EXPECT_EQ(told[1].behaviour, 255);
+  EXPECT_FLOAT_EQ(told[1].end_to_end_max, 3000);
+  EXPECT_EQ(std::string(told[2].name.data()), "ground_flow") << "in turn";
+}
+
+TEST_F(TelemetryTest, TheStateIsThatOfTheNewestTick) {
+  config_.telemetry.state_hz = 50;
+  start();
+  Command c;
+  c.tick = 5, c.released_at_ns = now_ns_, c.exposed_at_ns = now_ns_ - 33 * kMillisecond;
+  c.q_ned_body = {0.8f, 0.6f, 0, 0};
+  c.thrust = 0.4f, c.cue_source = 2, c.mode = FlightMode::kBehaviour, c.sent = 1, c.velocity_held = 1;
+  shm::RingWriter ring(*flight_, shm::kCommand, "Command");
+  ring.write(c, now_ns_);
+  run_for(100 * kMillisecond);
+  c.tick = 6, c.exposed_at_ns = kNever;
+  ring.write(c, now_ns_);
+  run_for(100 * kMillisecond);
+  const auto told = heard<WaspState>();
+  ASSERT_EQ(told.size(), 2u) << "each tick once";
+  EXPECT_EQ(told[0].tick, 5u);
+  EXPECT_EQ(told[0].evidence_age_us, 33'000u);
+  EXPECT_EQ(told[0].q, c.q_ned_body);
+  EXPECT_EQ(told[0].cue_source, 2);
+  EXPECT_EQ(told[0].mode, wasp_flight_mode::kBehaviour);
+  EXPECT_EQ(told[0].flags, wasp_state_flags::kSent | wasp_state_flags::kVelocityHeld);
+  EXPECT_EQ(told[1].evidence_age_us, 0xffffffffu);
+}
+
+TEST_F(TelemetryTest, AFlowFieldComesInPartsOfOneField) {
+  config_.telemetry.flow_field_hz = 5;
+  start();
+  FlowMessage field = wall_on_the_left(config_.camera, now_ns_);
+  field.frame_sequence = 9, field.derotated = 1;
+  for (int i = 0; i < field.still.count(); ++i) {
+    FlowCell& cell = field.still.cells[static_cast<std::size_t>(i)];
+    cell.u_px = 0.25f * static_cast<float>(i), cell.v_px = -1.5f, cell.valid = i % 7 != 0;
+  }
+  FlowWriter writer(*flight_, shm::kFlow);
+  writer.publish(field, now_ns_, now_ns_);
+  gate_ = LineGate(LineGateParams{0, 6'000});  // too little for a field at once
+  for (std::uint32_t newer = 10; heard<WaspFlow>().size() < 3; ++newer) {
+    run_for(10 * kMillisecond);
+    field.frame_sequence = newer;
+    writer.publish(field, now_ns_, now_ns_);
+    ASSERT_LT(newer, 100u);
+  }
+  const auto parts = heard<WaspFlow>();
+  std::size_t cells = 0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_EQ(parts[i].frame_sequence, 9u) << "of one field, whatever came meanwhile";
+    EXPECT_EQ(parts[i].first, cells);
+    EXPECT_EQ(parts[i].columns, 12);
+    EXPECT_EQ(parts[i].rows, 9);
+    EXPECT_EQ(parts[i].width, config_.camera.intrinsics.width_px);
+    EXPECT_EQ(parts[i].flags, wasp_flow_flags::kStill);
+    EXPECT_NEAR(parts[i].interval_us, 33'333, 1);
+    for (std::size_t k = 0; k < parts[i].count; ++k, ++cells) {
+      if (cells % 7 == 0) {
+        EXPECT_EQ(parts[i].u[k], INT16_MIN) << cells;
+        continue;
+      }
+      EXPECT_NEAR(static_cast<float>(parts[i].u[k]) * parts[i].scale, 0.25f * static_cast<float>(cells), 0.01) << cells;
+      EXPECT_NEAR(static_cast<float>(parts[i].v[k]) * parts[i].scale, -1.5, 0.01) << cells;
+    }
+  }
+  EXPECT_EQ(cells, 108u);
+}
+
 TEST_F(TelemetryTest, RatesAreSetAndStoppedByCommand) {
   const auto status = ComputerWatch().look(now_ns_);
   const auto count = [&](DurationNs duration) {
