@@ -30,6 +30,7 @@
 #include "sim/lab_textures.h"
 #include "sim/vrml_exposure.h"
 #include "sim/vrml_motion.h"
+#include "sim/vrml_search.h"
 #include "sim/vrml_shapes.h"
 #include "sim/vrml_text.h"
 
@@ -314,7 +315,7 @@ const Node* first_of(SoVRMLGroup& root) {
   search.setType(Node::getClassTypeId());
   search.setInterest(SoSearchAction::FIRST);
   search.apply(&root);
-  return search.getPath() == nullptr ? nullptr : static_cast<const Node*>(search.getPath()->getTail());
+  return tail_of<Node>(search.getPath());
 }
 
 void read_head(SoVRMLGroup& root, Scene& scene, bool& baked) {

@@ -14,6 +14,8 @@
 #include <set>
 #include <stdexcept>
 
+#include "sim/vrml_search.h"
+
 namespace wasp::sim {
 namespace {
 
@@ -148,7 +150,8 @@ VrmlMotions take_motions(SoVRMLGroup& root) {
   search.apply(&root);
   VrmlMotions motions;
   for (int i = 0; i < search.getPaths().getLength(); ++i) {
-    auto* node = static_cast<SoVRMLTransform*>(search.getPaths()[i]->getTail());
+    auto* node = tail_of<SoVRMLTransform>(search.getPaths()[i]);
+    if (node == nullptr) continue;
     const auto* path = engine_behind<SoVRMLPositionInterpolator>(node->translation);
     const auto* turn = engine_behind<SoVRMLOrientationInterpolator>(node->rotation);
     const SoVRMLTimeSensor* clock = clock_of(*node, path, turn);

@@ -235,6 +235,7 @@ save("vrml", "grid", HEAD + "Shape { geometry ElevationGrid { xDimension 2 zDime
 save("vrml", "extrusion", HEAD + "Shape { geometry Extrusion { crossSection [1 1, 1 -1, -1 -1, 1 1] spine [0 0 0, 0 1 0, 1 2 0] scale [1 1, 2 2, 1 1] } }\n")
 save("vrml", "names", HEAD + "DEF A Group { children [ DEF B Shape { " + FACE % "" + " } USE B ] }\nUSE A\n")
 save("vrml", "proto", HEAD + "PROTO P [ field SFVec3f s 1 1 1 ] { Shape { geometry Box { size IS s } } }\nP { s 2 2 2 }\nInline { url \"a.wrl\" }\n")
+save("vrml", "misplaced", HEAD + "Shape { geometry Box { } }\nShape { geometry WorldInfo { title \"inside\" } }\nShape { appearance Transform { } }\n")
 save("vrml", "head", HEAD + 'WorldInfo { title "t" info [ "wasp: light is baked into the colours; exposure 1.5" "wasp: surfaces are smooth" ] }\n'
      "Background { skyColor [0.2 0.3 0.4] }\nViewpoint { position 1 2 3 orientation 0 1 0 1 }\nShape { " + FACE % " colorPerVertex FALSE color Color { color [1 0 0] } colorIndex [0]" + " }\n")
 save("vrml", "picture", HEAD + 'Shape { appearance Appearance { texture ImageTexture { url ["absent.png"] } } ' + FACE % "" + " }\n")

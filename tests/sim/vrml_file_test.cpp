@@ -309,6 +309,18 @@ TEST_F(VrmlFile, WhatCoinWouldCrashHangOrReadOnIsRefusedByName) {
       "");
 }
 
+/// Coin hides what stands inside a Shape: the path of a search ends at the Shape instead.
+TEST_F(VrmlFile, NodesInPlacesThatAreNotTheirsDoNotMislead) {
+  const std::string box = std::string(kHead) + "\nShape { geometry Box { } }\n";
+  for (const char* node : {"WorldInfo", "Viewpoint", "Background", "Transform"})
+    for (const char* field : {"geometry", "appearance"}) {
+      const std::string error = error_of(text("odd.wrl", box + "Shape { " + field + " " + node + " { } }\n"));
+      EXPECT_EQ(error.find("library fails"), std::string::npos) << node << " as " << field << ": " << error;
+    }
+  const fs::path titled = text("titled.wrl", box + "Shape { geometry WorldInfo { title \"inside\" } }\n");
+  EXPECT_EQ(read_vrml(titled).title, "inside");
+}
+
 TEST_F(VrmlFile, AFileThatCannotBeWrittenLeavesNothing) {
   EXPECT_THROW(write_vrml(make_scene("ground", 1), folder_ / "no" / "such" / "folder.wrl"), std::runtime_error);
   EXPECT_THROW(write_vrml(Scene{}, folder_ / "empty.wrl"), std::runtime_error);
