@@ -248,7 +248,8 @@ Setpoint by_mode(const ControlParams& p, const ControlInput& in, const ControlSt
       neutral.thrust = hovering_field(p, in, s);
       return neutral;
     case FlightMode::kFailsafe:
-      neutral.thrust = sinking_field(p, in, s, cos_tilt(in));
+      neutral.thrust = p.failsafe_action == FailsafeAction::kStopStream ? hovering_field(p, in, s)
+                                                                        : sinking_field(p, in, s, cos_tilt(in));
       return neutral;
     case FlightMode::kDisarmed:
       break;
@@ -272,6 +273,18 @@ float heading_of(const ControlInput& in, ControlState& s) noexcept {
   return s.heading_rad;
 }
 
+/// The stream ends with level setpoints: an autopilot flies the last one on until it notices (PX4 for COM_OF_LOSS_T,
+/// ArduCopter for up to three seconds).
+bool silent(const ControlParams& p, const ControlInput& in, ControlState& s) noexcept {
+  constexpr DurationNs kLastWords = 140 * kMillisecond;  // three setpoints at 20 Hz
+  if (s.mode.mode != FlightMode::kFailsafe || p.failsafe_action != FailsafeAction::kStopStream) {
+    s.stopping_since_ns = kNever;
+    return false;
+  }
+  if (s.stopping_since_ns == kNever) s.stopping_since_ns = in.now_ns;
+  return in.now_ns - s.stopping_since_ns >= kLastWords;
+}
+
 /// Through the limits, from the last setpoint sent, into the command. Whatever is not the behaviours' own is level at
 /// once.
 void put_setpoint(const ControlParams& p, const ControlInput& in, const Setpoint& chosen, ControlState& s,
@@ -287,7 +300,7 @@ void put_setpoint(const ControlParams& p, const ControlInput& in, const Setpoint
   c.reason = s.mode.reason;
   const bool not_ours = in.autopilot.heard_at_ns == kNever || s.mission.phase == MissionPhase::kBroken ||
                         s.mission.phase == MissionPhase::kWatch;
-  const bool stopped = s.mode.mode == FlightMode::kFailsafe && p.failsafe_action == FailsafeAction::kStopStream;
+  const bool stopped = silent(p, in, s);
   const bool left = s.mode.mode == FlightMode::kManual && in.autopilot.semantics.silent_when_left;
   c.sent = !not_ours && !stopped && !left;
 }

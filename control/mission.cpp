@@ -7,14 +7,15 @@
 namespace wasp::control {
 namespace {
 
-constexpr DurationNs kLandedFor = 700 * kMillisecond;
+constexpr DurationNs kLandedFor = 700 * kMillisecond, kUnmovedFor = 3 * kSecond;
+constexpr float kUnmoved_m = 0.04f;
 constexpr double kLongestLanding_s = 60.0, kLongestDisarm_s = 10.0;
 constexpr float kBelowGround_m = 0.25f;  // landing target: firmly onto the floor
 
 void enter(MissionState& s, MissionPhase phase, TimeNs now_ns) noexcept {
   s.phase = phase;
   s.since_ns = now_ns;
-  s.settled_since_ns = kNever;
+  s.settled_since_ns = s.resting_since_ns = kNever;
 }
 
 void end_early(MissionState& s, MissionPhase phase, EarlyEnd why, TimeNs now_ns) noexcept {
@@ -23,6 +24,15 @@ void end_early(MissionState& s, MissionPhase phase, EarlyEnd why, TimeNs now_ns)
 }
 
 MissionPhase leg_phase(int i) noexcept { return static_cast<MissionPhase>(static_cast<int>(MissionPhase::kLeg0) + i); }
+
+/// Asked well below and not moving: what it stands on is not where the estimate of its height says the ground is.
+bool unmoved(const MissionInput& in, MissionState& s) noexcept {
+  if (!in.ground_seen || s.resting_since_ns == kNever || std::abs(in.height_m - s.resting_height_m) > kUnmoved_m) {
+    s.resting_since_ns = in.now_ns;
+    s.resting_height_m = in.height_m;
+  }
+  return in.now_ns - s.resting_since_ns >= kUnmovedFor;
+}
 
 bool standing_long_enough(const MissionParams& p, const MissionInput& in, MissionState& s) noexcept {
   if (!in.ground_seen || in.height_m > s.ground_height_m + p.landed_margin_m) {
@@ -134,7 +144,7 @@ MissionWish mission_step(const MissionParams& p, const MissionInput& in, Mission
         enter(s, MissionPhase::kDone, in.now_ns);
       else if (taken_away(in))
         end_early(s, MissionPhase::kWatch, EarlyEnd::kModeTaken, in.now_ns);
-      else if (standing_long_enough(p, in, s))
+      else if (standing_long_enough(p, in, s) || unmoved(in, s))
         enter(s, MissionPhase::kDisarm, in.now_ns);
       else if (in_phase_s > kLongestLanding_s)
         end_early(s, MissionPhase::kBroken, EarlyEnd::kNoGround, in.now_ns);

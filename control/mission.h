@@ -72,6 +72,8 @@ struct MissionState {
   TimeNs since_ns = kNever;          ///< entry into the phase
   TimeNs settled_since_ns = kNever;  ///< on the ground since
   float ground_height_m = 0;         ///< camera height while standing
+  float resting_height_m = 0;        ///< while landing: the height it has not left ...
+  TimeNs resting_since_ns = kNever;  ///< ... since
   EarlyEnd early_end = EarlyEnd::kNone;
 };
 

@@ -22,9 +22,12 @@ enum Px4Parameter : std::size_t {
 constexpr std::array<std::string_view, 8> kPx4Names{"MPC_THR_HOVER", "COM_OF_LOSS_T",  "COM_OBL_RC_ACT", "COM_OBL_ACT",
                                                     "MAV_FWDEXTSP",  "COM_RC_IN_MODE", "COM_RCL_EXCEPT", "NAV_DLL_ACT"};
 
-constexpr std::array<std::string_view, 8> kLossActs{"position mode", "altitude mode", "manual mode",   "return",
+constexpr std::array<std::string_view, 8> kLossActs{"position mode, without a radio return", "altitude mode, without a radio return",
+                                                    "manual mode, without a radio return", "return",
                                                     "it lands",      "hold",          "it terminates", "it disarms"};
 constexpr std::array<std::string_view, 5> kLossActsNoRadio{"it lands", "hold", "return", "it terminates", "lockdown"};
+
+constexpr unsigned kExceptOffboard = 4;  ///< bit of COM_RCL_EXCEPT
 
 template <std::size_t N>
 std::string_view choice(const std::array<std::string_view, N>& names, double value) noexcept {
@@ -53,6 +56,7 @@ constexpr std::array<std::string_view, 13> kCopterNames{
     "FRAME_CLASS",  "ARMING_CHECK", "SYSID_ENFORCE", "SYSID_MYGCS",    "ANGLE_MAX",      "DISARM_DELAY"};
 
 constexpr double kOptionsEnd = 4096;       ///< beyond: no bits of GUID_OPTIONS but a default that was never set
+constexpr double kOldGuidTimeout_s = 1.0;  ///< of releases without GUID_TIMEOUT; with it 3 s by default
 constexpr double kLongestTimeout_s = 5.0;  ///< of a setpoint stream that ended, until somebody notices
 constexpr std::uint32_t kVersion4_1Release = 0x040100'40;  ///< dev versions of 4.1 end in 00
 
@@ -136,7 +140,7 @@ Verdict judge_copter(const CheckContext& c, const Readings& r) noexcept {
   const bool thrust = c.wish.thrust || (!c.wish.climb_rate && thrust_is_thrust(c, r, v));
   v.semantics.vertical = thrust ? VerticalChannel::kThrust : VerticalChannel::kClimbRate;
   v.semantics.learn_hover = thrust && c.wish.hover_share <= 0;
-  v.failsafe << "after " << (known(r, kGuidTimeout) ? at(r, kGuidTimeout).value : 1.0)
+  v.failsafe << "after " << (known(r, kGuidTimeout) ? at(r, kGuidTimeout).value : kOldGuidTimeout_s)
              << " s it levels, holds its height and stays in the mode";
   if (!climb_scales(r, v.semantics) && !thrust)
     v.refusal << "it answers neither WPNAV_SPEED_UP, _DN nor WP_SPD_UP, _DN: what thrust asks for is not known";
@@ -191,7 +195,9 @@ std::string_view meaning_of(Flavour flavour, std::size_t i, double value) WASP_R
     if (i == kLossAct) return choice(kLossActs, value);
     if (i == kLossActNoRadio) return choice(kLossActsNoRadio, value);
     if (i == kRadioMode && value == 0) return "it arms with a radio alone";
-    if (i == kGcsAct && value > 0) return "it may want a ground station to arm";
+    if (i == kRadioExcept && value >= 0 && value < 1024 && (static_cast<unsigned>(value) & kExceptOffboard) == 0)
+      return "without a radio, releases before 1.14 never enter OFFBOARD; 4 lets them";
+    if (i == kGcsAct && value > 0) return "it arms only while a ground station is connected; 0 lifts that";
   }
   if (flavour == Flavour::kArduPilot) {
     if (i == kGuidOptions && value >= kOptionsEnd) return "no options but a default that was never set; not used";

@@ -23,6 +23,7 @@ struct SetupWish {
   bool climb_rate = false, thrust = false;  ///< the meaning of the thrust field, where the user says it; neither: read
   bool enforce = true;                      ///< false: a refusal is only said
   double stream_hz = 100;                   ///< attitude and IMU
+  double position_hz = 20;                  ///< LOCAL_POSITION_NED
 };
 
 enum class ReadingState : std::uint8_t { kUnknown, kKnown, kAbsent };

@@ -9,13 +9,15 @@ constexpr std::uint16_t kRequestCapabilities = 520;  ///< MAV_CMD_REQUEST_MESSAG
 /// A message to be sent by itself, and how often.
 struct StreamRow {
   std::uint32_t message;
-  double hz;  ///< 0: as the attitude
+  double hz;  ///< 0: as the wish says
 };
+/// PX4 sends HEARTBEAT once a second, whatever it is asked.
 constexpr std::array kPx4Streams{StreamRow{mavlink::AttitudeQuaternion::kId, 0}, StreamRow{mavlink::HighresImu::kId, 0},
-                                 StreamRow{mavlink::LocalPositionNed::kId, 20}, StreamRow{mavlink::Heartbeat::kId, 5}};
+                                 StreamRow{mavlink::LocalPositionNed::kId, 0}};
 constexpr std::array kCopterStreams{StreamRow{mavlink::Attitude::kId, 0}, StreamRow{mavlink::RawImu::kId, 0},
-                                    StreamRow{mavlink::LocalPositionNed::kId, 20},
+                                    StreamRow{mavlink::LocalPositionNed::kId, 0},
                                     StreamRow{mavlink::Heartbeat::kId, 5}};
+constexpr double kGapInAttitudes = 5;  ///< of so many intervals: somebody else has set the rate
 
 /// MAV_DATA_STREAM, the way before SET_MESSAGE_INTERVAL: raw sensors, position, attitude.
 struct OldStreamRow {
@@ -60,7 +62,9 @@ void AutopilotSetup::restart() WASP_REALTIME {
   version_question_ = write_question_ = {};
   version_known_ = concluded_ = heard_told_ = streams_fall_back_ = false;
   conclusion_told_ = true;
-  streams_due_ns_ = 0;
+  streams_due_ns_ = streams_asked_ns_ = 0;
+  attitude_at_ns_ = kNever;
+  streams_lost_ = false;
   stream_ = 0;
   stream_rounds_ = attitudes_ = 0;
   window_from_ns_ = kNever;
@@ -107,7 +111,19 @@ void AutopilotSetup::take_parameter(const mavlink::ParamValue& m) WASP_REALTIME 
 
 void AutopilotSetup::on_attitude(TimeNs now_ns) WASP_REALTIME {
   if (window_from_ns_ == kNever) window_from_ns_ = now_ns;
+  attitude_at_ns_ = now_ns;
   ++attitudes_;
+}
+
+/// A ground station on the same channel may set the rates of all streams again and again (MAVProxy does): they are asked
+/// for at once, before an attitude is too old.
+void AutopilotSetup::watch_attitude(TimeNs now_ns) WASP_REALTIME {
+  if (attitude_at_ns_ == kNever || stream_ != 0 || stream_rounds_ == 0 || now_ns - streams_asked_ns_ < kStreamsLost)
+    return;
+  if (now_ns - attitude_at_ns_ < from_seconds(kGapInAttitudes / context_.wish.stream_hz)) return;
+  streams_lost_ = true;
+  streams_fall_back_ = false;
+  streams_due_ns_ = now_ns;
 }
 
 void AutopilotSetup::measure_attitude(TimeNs now_ns) WASP_REALTIME {
@@ -151,6 +167,7 @@ std::size_t AutopilotSetup::next_question(TimeNs now_ns, AutopilotLink& link,
                                           std::span<std::uint8_t> out) WASP_REALTIME {
   if (!active()) return 0;
   measure_attitude(now_ns);
+  watch_attitude(now_ns);
   if (status_.received_at_ns == kNever || !fits(context_.wish.flavour, status_.autopilot)) return 0;
   if (const std::size_t n = ask_version(now_ns, link, out); n != 0) return n;
   if (const std::size_t n = ask_streams(now_ns, link, out); n != 0) return n;
@@ -206,9 +223,8 @@ std::size_t AutopilotSetup::ask_parameter(TimeNs now_ns, AutopilotLink& link,
   if (const std::size_t n = write_parameter(now_ns, link, out); n != 0) return n;
   if (now_ns < refresh_due_ns_) return 0;
   refresh_due_ns_ = now_ns + kRefreshEvery;
-  do refreshed_ = (refreshed_ + 1) % names_.size();
-  while (readings_[refreshed_].state != ReadingState::kKnown && refreshed_ != 0);
-  return readings_[refreshed_].state == ReadingState::kKnown ? read_parameter(refreshed_, link, out) : 0;
+  refreshed_ = (refreshed_ + 1) % names_.size();
+  return read_parameter(refreshed_, link, out);
 }
 
 /// All of them once; then again, by the old way in turn with the new, while the attitude comes too rarely.
@@ -216,7 +232,7 @@ std::size_t AutopilotSetup::ask_streams(TimeNs now_ns, AutopilotLink& link, std:
   if (now_ns < streams_due_ns_) return 0;
   const auto rows = streams_of(context_.wish.flavour);
   const double wanted_hz = context_.wish.stream_hz;
-  if (stream_ == 0 && stream_rounds_ > 0 && attitude_hz_ >= 0.5 * wanted_hz) {
+  if (stream_ == 0 && stream_rounds_ > 0 && !streams_lost_ && attitude_hz_ >= 0.5 * wanted_hz) {
     streams_due_ns_ = now_ns + kStreamsAgain;
     return 0;
   }
@@ -227,12 +243,16 @@ std::size_t AutopilotSetup::ask_streams(TimeNs now_ns, AutopilotLink& link, std:
                                                row.stream, 1},
                     out);
   } else {
-    const double hz = rows[stream_].hz > 0 ? std::min(rows[stream_].hz, wanted_hz) : wanted_hz;
+    const bool position = rows[stream_].message == mavlink::LocalPositionNed::kId;
+    const double own_hz = position ? context_.wish.position_hz : rows[stream_].hz;
+    const double hz = own_hz > 0 ? std::min(own_hz, wanted_hz) : wanted_hz;
     n = link.encode_message_interval(rows[stream_].message, from_seconds(1 / hz), 0, out);
   }
   stream_ = (stream_ + 1) % (streams_fall_back_ ? kOldStreams.size() : rows.size());
   if (stream_ != 0) return n;
   ++stream_rounds_;
+  streams_lost_ = false;
+  streams_asked_ns_ = now_ns;
   streams_fall_back_ = stream_rounds_ % 2 == 0 && context_.wish.flavour == Flavour::kArduPilot;
   streams_due_ns_ = now_ns + kStreamsAgain;
   return n;

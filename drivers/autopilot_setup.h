@@ -30,7 +30,8 @@ class AutopilotSetup {
   static constexpr int kTries = 10;  ///< of a question before its answer counts as absent
   static constexpr DurationNs kAskAgain = 250 * kMillisecond;
   static constexpr DurationNs kStreamsAgain = 2 * kSecond;  ///< before a stream that is missing is asked for again
-  static constexpr DurationNs kRefreshEvery = 500 * kMillisecond;  ///< on the ground: one parameter
+  static constexpr DurationNs kStreamsLost = 500 * kMillisecond;  ///< likewise, one that somebody else has slowed down
+  static constexpr DurationNs kRefreshEvery = 500 * kMillisecond;  ///< on the ground: one parameter, absent ones too
   static constexpr DurationNs kSilence = 3 * kSecond;              ///< of heartbeats; after it everything is asked anew
   static constexpr double kLeastAttitude_hz = 12;                  ///< below it attitudes are too old between two
 
@@ -49,6 +50,8 @@ class AutopilotSetup {
   bool take_news(TextLine& line, bool& verdict) WASP_REALTIME;
 
   [[nodiscard]] SetupBar bar() const WASP_REALTIME;
+  /// There is something to be asked: not of wasp's own dialect.
+  [[nodiscard]] bool active() const WASP_REALTIME { return context_.wish.flavour != Flavour::kWasp; }
   [[nodiscard]] const AutopilotSemantics& semantics() const WASP_REALTIME { return semantics_; }
   [[nodiscard]] const Verdict& verdict() const noexcept { return verdict_; }
   [[nodiscard]] const Readings& readings() const noexcept { return readings_; }
@@ -70,9 +73,9 @@ class AutopilotSetup {
   std::size_t write_parameter(TimeNs now_ns, AutopilotLink& link, std::span<std::uint8_t> out) WASP_REALTIME;
   void take_parameter(const mavlink::ParamValue& value) WASP_REALTIME;
   void measure_attitude(TimeNs now_ns) WASP_REALTIME;
+  void watch_attitude(TimeNs now_ns) WASP_REALTIME;
   void conclude() WASP_REALTIME;
   bool due(Question& question, TimeNs now_ns) const WASP_REALTIME;
-  [[nodiscard]] bool active() const WASP_REALTIME { return context_.wish.flavour != Flavour::kWasp; }
   [[nodiscard]] bool all_read() const WASP_REALTIME;
 
   CheckContext context_;
@@ -87,9 +90,10 @@ class AutopilotSetup {
   ParameterEncoding encoding_;
   bool version_known_ = false, concluded_ = false, conclusion_told_ = true, heard_told_ = false;
   TimeNs streams_due_ns_ = 0, refresh_due_ns_ = 0, window_from_ns_ = kNever;
+  TimeNs attitude_at_ns_ = kNever, streams_asked_ns_ = 0;
   std::size_t stream_ = 0, refreshed_ = 0;  ///< next of the table; next parameter to read again
   int stream_rounds_ = 0;
-  bool streams_fall_back_ = false;
+  bool streams_fall_back_ = false, streams_lost_ = false;
   int attitudes_ = 0;
   double attitude_hz_ = 0;
 };

@@ -259,9 +259,10 @@ class Flight {
     for (std::size_t i = 0; i < table_.size(); ++i)
       control.behaviour_watches.push_back(config_.behaviours[i].enabled ? wire_behaviour(i) : nullptr);
     telemetry_ = std::make_unique<Telemetry>(config_, flight_, autopilot_);
+    drivers::SetupWish wish = config_.autopilot.wish(config_.control.limits.max_tilt_rad);
+    wish.position_hz = std::max(wish.position_hz, config_.telemetry.position_hz);
     link_ = std::make_unique<LinkLoop>(flight_, port_, autopilot_, stages_, report_, link_events_,
-                                       add_watch(config_.link_thread),
-                                       config_.autopilot.wish(config_.control.limits.max_tilt_rad), link_services());
+                                       add_watch(config_.link_thread), wish, link_services());
     link_->correct(config_.imu);
     control.watch = &add_watch(config_.control_thread);
     control.guard = guard_ ? &guard_->block() : nullptr;

@@ -206,11 +206,13 @@ void LinkLoop::set_up(TimeNs now_ns, RunStatus& status) WASP_REALTIME {
     status.autopilot[i].store(i < line.view().size() ? line.view()[i] : '\0', std::memory_order_relaxed);
   now_.setup_bar = setup_.bar();
   now_.semantics = setup_.semantics();
+  if (!heartbeat_seen_) report_.store(now_);  // so that control can say what it waits for
 }
 
-/// Its mode and arming are to be known within half a second; by itself it says them once a second.
+/// Of an autopilot that is not asked by the setup: its mode and arming are to be known within half a second; by itself it
+/// says them once a second.
 void LinkLoop::ask_for_beats() WASP_REALTIME {
-  if (beats_asked_ || !heartbeat_seen_ || !gate_.fits(2 * kQuestionBytes, received_at_ns_)) return;
+  if (beats_asked_ || setup_.active() || !heartbeat_seen_ || !gate_.fits(2 * kQuestionBytes, received_at_ns_)) return;
   beats_asked_ = true;
   std::array<std::uint8_t, mavlink::kMaxFrame> out;
   const std::size_t n = autopilot_.encode_message_interval(mavlink::Heartbeat::kId, kAutopilotBeat, 0, out);

@@ -53,7 +53,7 @@ AutopilotLink::AutopilotLink(FlightController& flight, DurationNs clock_offset_n
       parameters_(flight.kind().flavour),
       tells_events_(chatter == Chatter::kFull) {
   const bool full = tells_events_, px4 = is(Flavour::kPx4), ardupilot = is(Flavour::kArduPilot);
-  streams_ = {{{mavlink::Heartbeat::kId, 200, 200},
+  streams_ = {{{mavlink::Heartbeat::kId, kTicksPerSecond, kTicksPerSecond},
                {ardupilot ? mavlink::Attitude::kId : mavlink::AttitudeQuaternion::kId, ardupilot ? 50u : 2u, 0},
                {ardupilot ? mavlink::RawImu::kId : mavlink::HighresImu::kId,
                 ardupilot ? 100u
@@ -71,6 +71,7 @@ AutopilotLink::AutopilotLink(FlightController& flight, DurationNs clock_offset_n
 void AutopilotLink::apply_parameters() {
   if (is(Flavour::kPx4)) flight_.set_timeout(from_seconds(parameters_.value("COM_OF_LOSS_T", 1)));
   if (!is(Flavour::kArduPilot)) return;
+  flight_.set_timeout(from_seconds(parameters_.value("GUID_TIMEOUT", 3)));
   const auto options = static_cast<unsigned>(parameters_.value("GUID_OPTIONS", 0));
   flight_.set_climb_rate((options & 8u) == 0, static_cast<float>(parameters_.value("WPNAV_SPEED_UP", 250) / 100),
                          static_cast<float>(parameters_.value("WPNAV_SPEED_DN", 150) / 100));
@@ -185,6 +186,7 @@ void AutopilotLink::on_parameter_set(const mavlink::ParamSet& request) {
 CommandResult AutopilotLink::set_interval(float message, float interval_us) {
   for (Stream& stream : streams_) {
     if (message != static_cast<float>(stream.id)) continue;
+    if (is(Flavour::kPx4) && stream.id == mavlink::Heartbeat::kId) return CommandResult::kFailed;
     if (interval_us == 0.f || interval_us == -1.f) {
       stream.every = interval_us == 0.f ? stream.usual : 0;
       return CommandResult::kAccepted;

@@ -19,7 +19,7 @@ std::vector<SimParameter> factory(drivers::Flavour flavour) {
       return {{"GUID_OPTIONS", 0, kInt32},    {"DEV_OPTIONS", 0, kInt32},   {"WPNAV_SPEED_UP", 250, kReal},
               {"WPNAV_SPEED_DN", 150, kReal}, {"FRAME_CLASS", 1, kInt8},    {"ARMING_CHECK", 1, kInt32},
               {"SYSID_ENFORCE", 0, kInt8},    {"SYSID_MYGCS", 255, kInt16}, {"ANGLE_MAX", 3000, kInt16},
-              {"DISARM_DELAY", 10, kInt8}};
+              {"DISARM_DELAY", 10, kInt8},    {"GUID_TIMEOUT", 3.0, kReal}};
     case drivers::Flavour::kWasp:
       break;
   }

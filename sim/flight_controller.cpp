@@ -21,7 +21,7 @@ constexpr float kIdleThrust = 0.03f;                      ///< below this the pr
 
 FlightController::FlightController(const VehicleParams& params, const AutopilotKind& kind)
     : params_(params), kind_(kind), controller_(params) {
-  if (kind.on_silence != OnSilence::kDescend) timeout_ns_ = kSecond;  // COM_OF_LOSS_T; a constant of ArduCopter
+  if (kind.on_silence != OnSilence::kDescend) timeout_ns_ = kSecond;  // COM_OF_LOSS_T, GUID_TIMEOUT
 }
 
 void FlightController::set_setpoint(const AttitudeSetpoint& setpoint, TimeNs now_ns) {
@@ -31,9 +31,18 @@ void FlightController::set_setpoint(const AttitudeSetpoint& setpoint, TimeNs now
   setpoint_at_ns_ = now_ns;
 }
 
+/// What others need to take a vehicle on the ground for landed: PX4 thrust below MPC_MANTHR_MIN, ArduCopter being asked
+/// down.
+bool FlightController::asked_up() const {
+  constexpr float kPx4Idle = 0.1f;
+  const bool heard = mode_ == ControllerMode::kOffboard && now_ns_ - setpoint_at_ns_ <= timeout_ns_;
+  if (kind_.flavour == Flavour::kWasp || !heard) return false;
+  return setpoint_.thrust >= (kind_.climb_rate ? 0.5f : kPx4Idle);
+}
+
 CommandResult FlightController::arm(bool armed, bool force) {
   if (armed && !armed_ && !force && !(estimator_.settled() && on_ground_)) return CommandResult::kTemporarilyRejected;
-  if (!armed && armed_ && !force && !on_ground_) return CommandResult::kDenied;
+  if (!armed && armed_ && !force && (!on_ground_ || asked_up())) return CommandResult::kDenied;
   if (armed != armed_) event_ = armed ? "armed" : "disarmed";
   if (armed && !armed_) mode_since_ns_ = now_ns_, grounded_since_ns_ = kLongAgo;
   armed_ = armed;

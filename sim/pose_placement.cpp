@@ -7,6 +7,7 @@ namespace {
 
 constexpr double kSamePlace_m = 2;  // a source that goes on this near to where it stopped is the same
 constexpr float kOffTheGround_m = 0.05f;
+constexpr float kRising_mps = 0.15f;
 
 Quat about_vertical(float angle_rad) { return Quat(Eigen::AngleAxisf(angle_rad, Vec3::UnitZ())); }
 
@@ -48,7 +49,9 @@ void PosePlacement::find_origin(const ReportedPosition& reported) {
 
 PositionFix PosePlacement::place(const ReportedPosition& reported, TimeNs at_ns) {
   join(reported);
-  const bool at_start = !armed_once_ && !params_.origin_ned_m;
+  // Who is told once a second that it is armed may rise before that.
+  const bool rises = placed_ && reported.velocity_ned_mps.z() < -kRising_mps;
+  const bool at_start = !armed_once_ && !rises && !params_.origin_ned_m;
   if (!placed_ || at_start) find_origin(reported);
   last_reported_m_ = reported.position_ned_m;
   last_world_m_ = in_world(reported.position_ned_m);

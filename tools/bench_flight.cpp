@@ -13,6 +13,7 @@
 namespace wasp::tools {
 namespace {
 
+constexpr float kSpoolDown = 0.02f;  ///< of the thrust field, a step
 constexpr float kPeriod_s = 0.05f, kDegree = 0.017453293f, kGravity_mps2 = 9.80665f;
 constexpr double kLongestMode_s = 60, kLongestArm_s = 120, kLongestClimb_s = 30, kLongestLanding_s = 60;
 constexpr double kMostTilt_deg = 20, kMostHeight_m = 20;
@@ -106,7 +107,8 @@ void BenchFlight::advance(const BenchSight& s, double in_phase_s) {
       if (in_phase_s > 3) enter(Phase::kLand, s.now_ns, "landing");
       return;
     case Phase::kLand:
-      if (!s.armed) return enter(Phase::kOver, s.now_ns, "landed and disarmed");
+      landed_ = !s.armed;
+      if (landed_) return enter(Phase::kOver, s.now_ns, "landed and disarmed");
       if (in_phase_s > kLongestLanding_s) enter(Phase::kOver, s.now_ns, "it does not disarm; nothing is sent any more");
       return;
     case Phase::kOver:
@@ -129,6 +131,17 @@ float BenchFlight::field(const BenchSight& s, const AutopilotSemantics& semantic
   return control::altitude_hold_step(hold, target_m, height_m, s.climb_mps, cos_tilt, kPeriod_s, hold_);
 }
 
+/// While landing: at the height it started from, or for two seconds at one height though it is asked down.
+bool BenchFlight::stands(const BenchSight& s) {
+  constexpr float kNear_m = 0.15f, kUnmoved_m = 0.05f;
+  const float height_m = s.height_m.value_or(0.f) - ground_m_;
+  if (resting_since_ns_ == kNever || std::abs(height_m - resting_m_) > kUnmoved_m) {
+    resting_since_ns_ = s.now_ns;
+    resting_m_ = height_m;
+  }
+  return s.now_ns - since_ns_ > 2 * kSecond && (height_m < kNear_m || s.now_ns - resting_since_ns_ > 2 * kSecond);
+}
+
 BenchWish BenchFlight::step(const BenchSight& s, const AutopilotSemantics& semantics) {
   if (since_ns_ == kNever) since_ns_ = s.now_ns, yaw_rad_ = s.yaw_rad;
   const double in_phase_s = to_seconds(s.now_ns - since_ns_);
@@ -137,14 +150,16 @@ BenchWish BenchFlight::step(const BenchSight& s, const AutopilotSemantics& seman
   if (phase_ == Phase::kOver) return wish;
   const bool up = phase_ == Phase::kClimb || phase_ == Phase::kHold || phase_ == Phase::kLevel;
   const bool tilt = phase_ == Phase::kHold;
-  sent_field_ = 0;
+  const bool standing = phase_ == Phase::kLand && stands(s);
+  const float before = std::exchange(sent_field_, 0.f);
   if (up) sent_field_ = field(s, semantics, plan_.height_m);
   if (phase_ == Phase::kLand) sent_field_ = field(s, semantics, -1.f);
+  // PX4 takes nothing for landed that is not without thrust, and disarms nothing else.
+  if (standing && semantics.vertical == VerticalChannel::kThrust) sent_field_ = std::max(0.f, before - kSpoolDown);
   if (!up && phase_ != Phase::kLand) yaw_rad_ = s.yaw_rad;
   const Quat q = quat_from_euler({tilt ? plan_.roll_rad : 0.f, tilt ? plan_.pitch_rad : 0.f, yaw_rad_});
   wish.setpoint = {{q.w(), q.x(), q.y(), q.z()}, semantics.heading_rate_used, 0.f, sent_field_};
   wish.send = true;
-  const bool standing = phase_ == Phase::kLand && s.height_m.value_or(1.f) - ground_m_ < 0.15f && in_phase_s > 2;
   if (s.now_ns < ask_due_ns_) return wish;
   const double first_s = to_seconds(drivers::facts_of(flavour_).stream_first_ns);
   wish.ask_mode = phase_ == Phase::kMode && in_phase_s >= first_s;

@@ -42,6 +42,8 @@ class BenchFlight {
   /// Every 50 ms.
   BenchWish step(const BenchSight& sight, const AutopilotSemantics& semantics);
   [[nodiscard]] bool over() const { return phase_ == Phase::kOver; }
+  /// It is over, and the vehicle was landed and disarmed.
+  [[nodiscard]] bool landed() const { return landed_; }
   /// A line about what happened since the last call; empty: nothing.
   std::string take_news();
   /// Attitude reached less attitude commanded, mean of the last second [rad]; none if it was never held.
@@ -51,13 +53,16 @@ class BenchFlight {
   enum class Phase { kMode, kArm, kClimb, kHold, kLevel, kLand, kOver };
   void enter(Phase phase, TimeNs now_ns, std::string news);
   void advance(const BenchSight& sight, double in_phase_s);
+  bool stands(const BenchSight& sight);
   float field(const BenchSight& sight, const AutopilotSemantics& semantics, float target_m);
   void note_error(const BenchSight& sight, double in_phase_s);
 
   BenchPlan plan_;
   drivers::Flavour flavour_;
   Phase phase_ = Phase::kMode;
-  TimeNs since_ns_ = kNever, ask_due_ns_ = 0;
+  TimeNs since_ns_ = kNever, ask_due_ns_ = 0, resting_since_ns_ = kNever;
+  float resting_m_ = 0;
+  bool landed_ = false;
   float ground_m_ = 0, yaw_rad_ = 0, sent_field_ = 0;
   control::AltitudeHoldState hold_;
   control::HoverShareState hover_;

@@ -53,10 +53,10 @@ int run(Options& o) {
   session.run(o.seconds, &flight);
   session.report();
   const auto error = flight.error();
-  if (!error) return 1;
+  if (!error) return 1;  // it was never held
   std::printf("attitude reached less commanded, mean of the last second: roll %.2f, pitch %.2f degrees\n",
               to_degrees(Radians{error->first}).value, to_degrees(Radians{error->second}).value);
-  return 0;
+  return flight.landed() ? 0 : 1;
 }
 
 }  // namespace
@@ -64,7 +64,8 @@ int run(Options& o) {
 int main(int argc, char** argv) {
   CLI::App app{
       "Who is on a line, which messages come how often, what the autopilot's parameters say, and whether it\n"
-      "can be flown by setpoints. Exit code 0: it can; 1: not, or not heard; 2: bad arguments."};
+      "can be flown by setpoints. Exit code 0: it can, and was flown and landed where that was asked for; 1: not, or not\n"
+      "heard; 2: bad arguments."};
   Options options;
   declare(app, options);
   try {

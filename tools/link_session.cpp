@@ -104,8 +104,11 @@ void LinkSession::ask(TimeNs now_ns) {
   if (setup_.take_news(line, verdict)) say(std::string(line.view()));
 }
 
+/// What bars arming bars nothing once it is armed: a vehicle in the air is flown on.
+bool LinkSession::barred() const { return setup_.bar() != drivers::SetupBar::kNone && !sight_.armed; }
+
 void LinkSession::fly(TimeNs now_ns, BenchFlight& flight) {
-  if (now_ns < setpoint_due_ns_ || setup_.bar() != drivers::SetupBar::kNone) return;
+  if (now_ns < setpoint_due_ns_ || barred()) return;
   setpoint_due_ns_ = std::max(setpoint_due_ns_ + kSetpointPeriod, now_ns);
   sight_.now_ns = now_ns;
   sight_.force_up_mps2 = force_up_mps2_;
@@ -126,8 +129,7 @@ void LinkSession::run(double seconds, BenchFlight* flight) {
     ask(now_ns);
     if (flight != nullptr) {
       fly(now_ns, *flight);
-      const bool stuck = setup_.bar() != drivers::SetupBar::kNone && now_ns > end_ns;
-      if (stuck) return say(fmt::format("not flying: {}", drivers::name_of(setup_.bar())));
+      if (barred() && now_ns > end_ns) return say(fmt::format("not flying: {}", drivers::name_of(setup_.bar())));
     }
     next_ns = std::max(next_ns + kTick, now_ns);
     listen(next_ns);

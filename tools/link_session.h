@@ -38,6 +38,7 @@ class LinkSession {
  private:
   void listen(TimeNs until_ns);
   void ask(TimeNs now_ns);
+  [[nodiscard]] bool barred() const;
   void fly(TimeNs now_ns, BenchFlight& flight);
   void say(const std::string& text) const;
 

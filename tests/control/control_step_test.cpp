@@ -114,6 +114,10 @@ TEST(ControlStep, ARefusedCommandBecomesHoldOrFailsafeWithinTheLimits) {
     p.failsafe_action = FailsafeAction::kStopStream;
     out.command.sent = 1;
     refuse(p, in, refusal, state, out);
+    EXPECT_EQ(out.command.sent, 1) << "the stream ends with level setpoints";
+    EXPECT_NEAR(out.command.q_ned_body[1], 0, 1e-6);
+    in.now_ns += 150 * kMillisecond;
+    refuse(p, in, refusal, state, out);
     EXPECT_EQ(out.command.sent, refusal == Refusal::kCueTooOld ? 1 : 0);
   }
 }

@@ -4,9 +4,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "messages/mavlink_frame.h"
@@ -60,6 +62,7 @@ class Autopilot {
   std::map<std::string, int> asked;
   std::vector<std::uint32_t> intervals;
   int old_streams = 0;
+  float position_interval_us = 0;
   bool takes_writes = false;
 
  private:
@@ -81,6 +84,7 @@ class Autopilot {
     if (f.is<mavlink::CommandLong>()) {
       const auto c = f.as<mavlink::CommandLong>();
       if (c.command == 511) intervals.push_back(static_cast<std::uint32_t>(c.param1));
+      if (c.command == 511 && intervals.back() == mavlink::LocalPositionNed::kId) position_interval_us = c.param2;
       if (c.command == 512 && version != 0) {
         mavlink::AutopilotVersion v;
         v.flight_sw_version = version;
@@ -216,7 +220,49 @@ TEST(AutopilotSetup, WhoAnswersNothingIsNotFlown) {
   copter.run(8);
   EXPECT_EQ(px4.setup().bar(), SetupBar::kRefused);
   EXPECT_EQ(copter.setup().bar(), SetupBar::kRefused);
-  EXPECT_LE(px4.asked["COM_OF_LOSS_T"], AutopilotSetup::kTries);
+  EXPECT_LE(px4.asked["COM_OF_LOSS_T"], AutopilotSetup::kTries + 4) << "from then on only now and then";
+}
+
+TEST(AutopilotSetup, AnAnswerThatComesLateCountsAllTheSame) {
+  Autopilot a(Flavour::kArduPilot);
+  const auto parameters = std::exchange(a.parameters, {});
+  a.run(8);
+  ASSERT_EQ(a.setup().bar(), SetupBar::kRefused);
+  a.parameters = parameters;
+  a.run(10);
+  EXPECT_EQ(a.setup().bar(), SetupBar::kNone);
+}
+
+TEST(AutopilotSetup, StreamsThatSomebodyElseSlowedDownAreAskedForAtOnce) {
+  Autopilot a(Flavour::kArduPilot);
+  a.run(6);
+  a.intervals.clear();
+  a.streams = false;
+  a.run(0.3);
+  EXPECT_EQ(std::count(a.intervals.begin(), a.intervals.end(), mavlink::Attitude::kId), 1);
+  a.run(2);
+  EXPECT_LE(std::count(a.intervals.begin(), a.intervals.end(), mavlink::Attitude::kId), 5) << "twice a second";
+}
+
+TEST(AutopilotSetup, ThePositionComesAsOftenAsItIsWanted) {
+  SetupWish wish;
+  wish.position_hz = 22;
+  Autopilot a(Flavour::kPx4, wish);
+  a.run(4);
+  EXPECT_GE(a.position_interval_us, 45'000);
+  EXPECT_LE(a.position_interval_us, 46'000);
+  EXPECT_EQ(std::count(a.intervals.begin(), a.intervals.end(), mavlink::Heartbeat::kId), 0) << "PX4 keeps its own";
+}
+
+TEST(AutopilotSetup, WhatKeepsPx4FromTheModeOrFromArmingIsSaid) {
+  Autopilot a(Flavour::kPx4);
+  a.parameters["COM_RCL_EXCEPT"] = {0, 6};
+  a.parameters["NAV_DLL_ACT"] = {2, 6};
+  a.parameters["COM_OBL_RC_ACT"].value = 0;
+  a.run(6);
+  EXPECT_TRUE(a.said("COM_RCL_EXCEPT = 0: without a radio, releases before 1.14 never enter OFFBOARD; 4 lets them"));
+  EXPECT_TRUE(a.said("NAV_DLL_ACT = 2: it arms only while a ground station is connected"));
+  EXPECT_TRUE(a.said("COM_OBL_RC_ACT = 0: position mode, without a radio return"));
 }
 
 TEST(AutopilotSetup, ThrustIsThrustOnlyWhereThatVersionSaysSo) {

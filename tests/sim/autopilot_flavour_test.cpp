@@ -233,8 +233,8 @@ TEST(SimulatedArduCopter, LevelsAndStaysWhenTheStreamEnds) {
   c.run(2.0);
   c.streaming = false;
   c.run(0.5);
-  EXPECT_LT(c.attitude().pitch_rad, -7 * kDegree) << "the last setpoint is flown on for a second";
-  c.run(2.5);
+  EXPECT_LT(c.attitude().pitch_rad, -7 * kDegree) << "the last setpoint is flown on for GUID_TIMEOUT";
+  c.run(4.5);
   EXPECT_NEAR(c.attitude().pitch_rad / kDegree, 0.f, 0.5f);
   EXPECT_EQ(c.main_mode(), 20u);
   EXPECT_TRUE(c.armed());
