@@ -60,22 +60,22 @@ void expect_honest(const EllipsoidModel& model, const FaultySensor& sensor, doub
 }
 
 TEST(EllipsoidFit, StandardDeviationsAreHonestForSixParameters) {
-  expect_honest({false, false}, {Vector3d(1.02, 0.97, 1.05).asDiagonal(), {0.3, -0.2, 0.5}, {}, 0.02}, kG, 40, 0);
+  expect_honest({false, false}, {Vector3d(1.02, 0.97, 1.05).asDiagonal(), {0.3, -0.2, 0.5}, 0.02}, kG, 40, 0);
 }
 
 TEST(EllipsoidFit, StandardDeviationsAreHonestForNineParameters) {
-  expect_honest({true, false}, {test::symmetric(1.02, 0.97, 1.05, 0.02, -0.015, 0.03), {0.3, -0.2, 0.5}, {}, 0.02}, kG,
-                60, 0);
+  expect_honest({true, false}, {test::symmetric(1.02, 0.97, 1.05, 0.02, -0.015, 0.03), {0.3, -0.2, 0.5}, 0.02}, kG, 60,
+                0);
 }
 
 TEST(EllipsoidFit, StandardDeviationsAreHonestWithTemperature) {
   expect_honest({true, true},
-                {test::symmetric(1.02, 0.97, 1.05, 0.02, -0.015, 0.03), {0.3, -0.2, 0.5}, {0.004, -0.003, 0.01}, 0.02},
+                {test::symmetric(1.02, 0.97, 1.05, 0.02, -0.015, 0.03), {0.3, -0.2, 0.5}, 0.02, {0.004, -0.003, 0.01}},
                 kG, 120, 30);
 }
 
 TEST(EllipsoidFit, AThirdOfTheReadingsMayBeWrong) {
-  const FaultySensor sensor{test::symmetric(1.1, 0.9, 1.0, 0.03, 0.02, -0.04), {0.1, -0.2, 0.15}, {}, 0.002};
+  const FaultySensor sensor{test::symmetric(1.1, 0.9, 1.0, 0.03, 0.02, -0.04), {0.1, -0.2, 0.15}, 0.002};
   auto samples = readings(sensor, 0.5, 300, 3);
   sim::Random random(9);
   for (std::size_t i = 0; i < samples.size(); i += 3)
@@ -158,7 +158,7 @@ std::string refusal_of(const VectorSensorOptions& o) {
 
 TEST(CalibrateAccel, FindsRestsAndTheSensorsFaults) {
   const test::TemporaryFolder folder;
-  const FaultySensor sensor{test::symmetric(1.02, 0.97, 1.05, 0.01, -0.02, 0.015), {0.3, -0.2, 0.5}, {}, 0.08};
+  const FaultySensor sensor{test::symmetric(1.02, 0.97, 1.05, 0.01, -0.02, 0.015), {0.3, -0.2, 0.5}, 0.08};
   Log log(folder.path / "a.csv", sensor, spread(24), 1, 1);
   ProgressBar bar("test");
   const Solution s = solve_vector_sensor(accel_options(log.table.path), bar);
@@ -177,8 +177,7 @@ TEST(CalibrateAccel, FindsRestsAndTheSensorsFaults) {
 TEST(CalibrateAccel, DISABLED_TakesRawCountsWithoutTimesAndSlopesOfTemperature) {
   const test::TemporaryFolder folder;
   const double per_count = 0.0479;  // a 10-bit converter, 3.3 V, ADXL320
-  const FaultySensor counts{
-      Vector3d(per_count, 1.03 * per_count, 0.97 * per_count).asDiagonal(), {512, 498, 530}, {}, 1.0};
+  const FaultySensor counts{Vector3d(per_count, 1.03 * per_count, 0.97 * per_count).asDiagonal(), {512, 498, 530}, 1.0};
   Log raw(folder.path / "raw.csv", counts, spread(20), 1, 2, 0, false);
   auto o = accel_options(raw.table.path);
   o.samples.unit = "counts";
@@ -190,7 +189,7 @@ TEST(CalibrateAccel, DISABLED_TakesRawCountsWithoutTimesAndSlopesOfTemperature) 
     EXPECT_NEAR(neutral[static_cast<std::size_t>(i)], counts.neutral[i], 0.5);
     EXPECT_NEAR(scale[static_cast<std::size_t>(i)] / counts.K(i, i), 1, 0.003);
   }
-  const FaultySensor warm{Matrix3d::Identity(), {0.1, 0.2, -0.1}, {0.01, -0.005, 0.02}, 0.05};
+  const FaultySensor warm{Matrix3d::Identity(), {0.1, 0.2, -0.1}, 0.05, {0.01, -0.005, 0.02}};
   auto directions = spread(30);
   std::vector<Vector3d> mixed;  // so that temperature and direction do not go together
   for (std::size_t i = 0; i < 30; ++i) mixed.push_back(directions[(i * 11) % 30]);
@@ -203,7 +202,7 @@ TEST(CalibrateAccel, DISABLED_TakesRawCountsWithoutTimesAndSlopesOfTemperature) 
 
 TEST(CalibrateAccel, SixFacesDetermineTheThesisModelAndNoMore) {
   const test::TemporaryFolder folder;
-  const FaultySensor sensor{Vector3d(1.02, 0.97, 1.05).asDiagonal(), {0.3, -0.2, 0.5}, {}, 0.05};
+  const FaultySensor sensor{Vector3d(1.02, 0.97, 1.05).asDiagonal(), {0.3, -0.2, 0.5}, 0.05};
   std::vector<Vector3d> faces;
   for (int i = 0; i < 3; ++i) faces.push_back(Vector3d::Unit(i)), faces.push_back(-Vector3d::Unit(i));
   Log log(folder.path / "six.csv", sensor, faces, 1, 4);
@@ -222,7 +221,7 @@ TEST(CalibrateAccel, SixFacesDetermineTheThesisModelAndNoMore) {
 
 TEST(CalibrateAccel, RefusesWhatDoesNotDetermineIt) {
   const test::TemporaryFolder folder;
-  const FaultySensor sensor{Matrix3d::Identity(), {0.1, 0.1, 0.1}, {}, 0.05};
+  const FaultySensor sensor{Matrix3d::Identity(), {0.1, 0.1, 0.1}, 0.05};
   Log one(folder.path / "one.csv", sensor, {Vector3d(0, 0, -1)}, 1, 1);
   EXPECT_NE(refusal_of(accel_options(one.table.path)).find("rest"), std::string::npos);
   auto upper = spread(40);
@@ -282,7 +281,7 @@ std::filesystem::path mag_log(const std::filesystem::path& file, const FaultySen
 
 TEST(CalibrateMag, HardAndSoftIronWithSpikes) {
   const test::TemporaryFolder folder;
-  const FaultySensor sensor{test::symmetric(1.08, 0.95, 1.0, 0.05, -0.03, 0.02), {120, -80, 200}, {}, 4};
+  const FaultySensor sensor{test::symmetric(1.08, 0.95, 1.0, 0.05, -0.03, 0.02), {120, -80, 200}, 4};
   const double norm = 1e-3 * Vector3d(210, 20, 430).norm();
   ProgressBar bar("test");
   const Solution s = solve_vector_sensor(mag_options(mag_log(folder.path / "m.csv", sensor, true, 0.05), norm), bar);
@@ -299,7 +298,7 @@ TEST(CalibrateMag, HardAndSoftIronWithSpikes) {
 
 TEST(CalibrateMag, RefusesLevelTurnsAndRest) {
   const test::TemporaryFolder folder;
-  const FaultySensor sensor{Matrix3d::Identity(), {120, -80, 200}, {}, 4};
+  const FaultySensor sensor{Matrix3d::Identity(), {120, -80, 200}, 4};
   EXPECT_NE(refusal_of(mag_options(mag_log(folder.path / "level.csv", sensor, false, 0))), "");
   test::Table still(folder.path / "still.csv", "xmag,ymag,zmag");
   sim::Random random(1);
