@@ -124,6 +124,14 @@ std::vector<Vector3d> spread(int count) {
   return out;
 }
 
+/// Rests in an order in which temperature and direction do not go together.
+std::vector<Vector3d> mixed(int count, int step) {
+  const auto directions = spread(count);
+  std::vector<Vector3d> out;
+  for (int i = 0; i < count; ++i) out.push_back(directions[static_cast<std::size_t>(i * step % count)]);
+  return out;
+}
+
 VectorSensorOptions accel_options(const std::filesystem::path& file) {
   VectorSensorOptions o;
   o.sensor = {Sensor::kAccel, "accel", kG, 0.01, 0.01, "m/s^2"};
@@ -173,8 +181,7 @@ TEST(CalibrateAccel, FindsRestsAndTheSensorsFaults) {
   EXPECT_EQ(s.pictures.size(), 2u);
 }
 
-// Open: the model with slopes of temperature is not chosen here, and the fit is refused (1.1 % of scatter).
-TEST(CalibrateAccel, DISABLED_TakesRawCountsWithoutTimesAndSlopesOfTemperature) {
+TEST(CalibrateAccel, TakesRawCountsWithoutTimesAndSlopesOfTemperature) {
   const test::TemporaryFolder folder;
   const double per_count = 0.0479;  // a 10-bit converter, 3.3 V, ADXL320
   const FaultySensor counts{Vector3d(per_count, 1.03 * per_count, 0.97 * per_count).asDiagonal(), {512, 498, 530}, 1.0};
@@ -190,14 +197,36 @@ TEST(CalibrateAccel, DISABLED_TakesRawCountsWithoutTimesAndSlopesOfTemperature) 
     EXPECT_NEAR(scale[static_cast<std::size_t>(i)] / counts.K(i, i), 1, 0.003);
   }
   const FaultySensor warm{Matrix3d::Identity(), {0.1, 0.2, -0.1}, 0.05, {0.01, -0.005, 0.02}};
-  auto directions = spread(30);
-  std::vector<Vector3d> mixed;  // so that temperature and direction do not go together
-  for (std::size_t i = 0; i < 30; ++i) mixed.push_back(directions[(i * 11) % 30]);
-  Log heat(folder.path / "heat.csv", warm, mixed, 1, 3, 30);
+  Log heat(folder.path / "heat.csv", warm, mixed(30, 11), 1, 3, 30);
   const Solution t = solve_vector_sensor(accel_options(heat.table.path), bar);
   const auto slope = values(t.flight.at(0), "accel_neutral_per_degc");
   ASSERT_EQ(slope.size(), 3u);
   for (int i = 0; i < 3; ++i) EXPECT_NEAR(slope[static_cast<std::size_t>(i)], warm.slope[i], 0.001);
+}
+
+TEST(CalibrateAccel, FindsCrossAxisTermsBesideADrift) {
+  const test::TemporaryFolder folder;
+  const FaultySensor sensor{
+      test::symmetric(1.02, 0.97, 1.05, 0.02, -0.03, 0.025), {0.3, -0.2, 0.5}, 0.05, {0.02, -0.01, 0.03}};
+  Log log(folder.path / "both.csv", sensor, mixed(36, 13), 1, 5, 30);
+  ProgressBar bar("test");
+  const Solution s = solve_vector_sensor(accel_options(log.table.path), bar);
+  const auto matrix = values(s.flight.at(0), "accel_matrix"), slope = values(s.flight.at(0), "accel_neutral_per_degc");
+  ASSERT_EQ(slope.size(), 3u);
+  for (int i = 0; i < 9; ++i) EXPECT_NEAR(matrix[static_cast<std::size_t>(i)], sensor.K(i / 3, i % 3), 0.002);
+  for (int i = 0; i < 3; ++i) EXPECT_NEAR(slope[static_cast<std::size_t>(i)], sensor.slope[i], 0.001);
+}
+
+// It is turned from top to bottom while it warms: a drift then passes for scales and cross-axis terms.
+TEST(CalibrateAccel, TemperatureThatGoesWithDirectionTellsNoSlope) {
+  const test::TemporaryFolder folder;
+  const FaultySensor sensor{Matrix3d::Identity(), {0.1, 0.2, -0.1}, 0.05, {0.01, -0.005, 0.02}};
+  Log log(folder.path / "together.csv", sensor, spread(30), 1, 3, 30);
+  ProgressBar bar("test");
+  const Solution s = solve_vector_sensor(accel_options(log.table.path), bar);
+  EXPECT_TRUE(values(s.flight.at(0), "accel_neutral_per_degc").empty());
+  ASSERT_EQ(s.notes.size(), 1u);
+  EXPECT_NE(s.notes[0].find("temperature changed by 29 degrees"), std::string::npos) << s.notes[0];
 }
 
 TEST(CalibrateAccel, SixFacesDetermineTheThesisModelAndNoMore) {
