@@ -5,6 +5,7 @@
 #include <cstdio>
 
 #include "calibration/calibrate_delay.h"
+#include "tests/calibration/hover_run.h"
 #include "tests/calibration/simulated_run.h"
 
 namespace wasp::calibration {
@@ -31,6 +32,22 @@ TEST(Delay, FoundOnSimulatedRecordings) {
     EXPECT_LT(std::abs(fit.delay_s - options.delay_s), std::max(4 * fit.sigma_s, 0.0005));
     for (int a = 0; a < 3; ++a) EXPECT_NEAR(fit.axes[static_cast<std::size_t>(a)].scale, 1, 0.15);
   }
+}
+
+/// A logger that is faster than the motion capture repeats its poses; the delay is that behind the poses themselves.
+TEST(Delay, IsNotShortenedByPosesThatALoggerRepeats) {
+  double error_s = 0;
+  for (unsigned seed = 1; seed <= 4; ++seed) {
+    const test::HoverOptions options{.delay_s = 0.01 * seed, .seed = seed};
+    const test::HoverRun run(options);
+    const DelayFit fit = delay_of(run.folder());
+    std::printf("[ measured ] delay %.1f ms: found %.2f, sigma %.2f\n", 1e3 * options.delay_s, 1e3 * fit.delay_s,
+                1e3 * fit.sigma_s);
+    EXPECT_TRUE(fit.ok()) << fit.refusal;
+    EXPECT_NEAR(fit.delay_s, options.delay_s, 0.002);
+    error_s += (fit.delay_s - options.delay_s) / 4;
+  }
+  EXPECT_NEAR(error_s, 0, 0.001);
 }
 
 TEST(Delay, RefusedWithoutRotation) {
