@@ -4,6 +4,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <memory>
@@ -22,6 +23,11 @@ TomlSection evidence_of(const DelayFit& fit, const TurnSource& source) {
   t.number("likelihood", fit.likelihood, "natural logarithm, over no relation");
   t.number("lead", fit.lead, "over the best delay elsewhere");
   t.text("against", source.name());
+  if (!fit.runs.empty()) {
+    std::vector<double> delays_ms;
+    for (const RunDelay& run : fit.runs) delays_ms.push_back(1e3 * run.delay_s);
+    t.numbers("delay_alone_ms", delays_ms, "of each recording").number("discord", fit.discord, "likelihood they gain");
+  }
   for (std::size_t a = 0; a < fit.axes.size(); ++a) {
     const AxisFit& axis = fit.axes[a];
     if (!axis.compared) continue;
@@ -69,11 +75,11 @@ Picture rates_picture(const DelayFit& fit) {
   return picture("rates", plot);
 }
 
-Solution solution_of(const DelayFit& fit, const TurnSource& source, const drivers::Recording& recording) {
+Solution solution_of(const DelayFit& fit, const std::vector<DelayRun>& runs) {
   Solution out;
+  const TurnSource& source = runs.front().source;
   out.flight.push_back(TomlSection("camera").number("delay_ms", 1e3 * fit.delay_s));
   out.evidence = evidence_of(fit, source);
-  out.source = recording.folder().string();
   out.samples = fit.frames;
   out.residual_unit = "rad/s";
   double weight = 0;
@@ -84,11 +90,18 @@ Solution solution_of(const DelayFit& fit, const TurnSource& source, const driver
     out.notes.emplace_back(
         "the recording does not say how the sensor lies to the camera: all three of its axes were fitted to each of "
         "the image's");
-  for (const auto& note : recording.notes()) out.notes.push_back(note);
   if (fit.delay_s < 0)
     out.notes.emplace_back("the images are stamped before they were exposed, or the sensor's stamps are late");
   out.pictures = {profile_picture(fit), rates_picture(fit), residual_picture(fit)};
   return out;
+}
+
+/// One kind of sensor for all of them: a delay behind one is not that behind the other.
+std::string against_of(const std::vector<drivers::Recording>& recordings, const std::string& asked) {
+  const auto with_gyro = std::count_if(recordings.begin(), recordings.end(),
+                                       [](const auto& recording) { return recording.motion().inertial.has_gyro; });
+  const bool mixed = with_gyro > 0 && with_gyro < std::ssize(recordings);
+  return asked == "best" && mixed ? "poses" : asked;
 }
 
 }  // namespace
@@ -104,22 +117,35 @@ TurnSource turn_source_of(const drivers::Recording& recording, const std::string
 }
 
 Solution solve_delay(const DelayOptions& options, ProgressBar& bar) {
-  const auto recording = drivers::Recording::open(options.folder);
-  const TurnSource source = turn_source_of(recording, options.against);
-  const auto turns = image_turns(recording, [&](double share) { bar.show(0.9 * share, "turns of the image"); });
+  std::vector<drivers::Recording> recordings;
+  for (const auto& folder : options.folders) recordings.push_back(drivers::Recording::open(folder));
+  const std::string against = against_of(recordings, options.against);
+  std::vector<DelayRun> runs;
+  for (const auto& recording : recordings) {
+    const auto done = static_cast<double>(runs.size()), all = static_cast<double>(recordings.size());
+    auto turns =
+        image_turns(recording, [&](double share) { bar.show(0.9 * (done + share) / all, "turns of the image"); });
+    runs.push_back({std::move(turns), turn_source_of(recording, against)});
+  }
   bar.show(0.9, "delay");
-  const DelayFit fit = fit_delay(turns, source, options.fit);
+  const DelayFit fit = fit_delay(runs, options.fit);
   if (!fit.ok())
     throw Refusal(fit.refusal + fmt::format(" [best {:.1f} ms, sigma {:.1f} ms, {} pairs]", 1e3 * fit.delay_s,
                                             1e3 * fit.sigma_s, fit.frames));
-  return solution_of(fit, source, recording);
+  Solution solution = solution_of(fit, runs);
+  for (const auto& recording : recordings) {
+    solution.source += (solution.source.empty() ? "" : ", ") + recording.folder().string();
+    for (const auto& note : recording.notes()) solution.notes.push_back(note);
+  }
+  return solution;
 }
 
 std::function<Solution(ProgressBar&)> prepare_delay(CLI::App& app) {
   auto options = std::make_shared<DelayOptions>();
   auto search_ms = std::make_shared<double>(1e3 * options->fit.search_s),
        sigma_ms = std::make_shared<double>(1e3 * options->fit.max_sigma_s);
-  app.add_option("DIR", options->folder, "recording with grey images and a gyro or true poses (`wasp recording DIR`)")
+  app.add_option("DIR", options->folders,
+                 "recordings of one camera with grey images and a gyro or true poses (`wasp recording DIR`)")
       ->required();
   app.add_option("--against", options->against, "what to hold the images against: the gyro if there is one, or")
       ->check(CLI::IsMember({"best", "gyro", "poses"}));

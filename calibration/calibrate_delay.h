@@ -1,6 +1,6 @@
-// `wasp calibrate delay DIR`: the delay of a camera's stamps behind the sensors', from a recording with grey images and
-// a gyro or true poses. delay_fit.h has the method. Written as [camera] delay_ms, which whoever writes a live camera's
-// frames takes off their stamps.
+// `wasp calibrate delay DIR ...`: the delay of a camera's stamps behind the sensors', from recordings with grey images
+// and a gyro or true poses; short ones are fitted together. delay_fit.h has the method. Written as [camera] delay_ms,
+// which whoever writes a live camera's frames takes off their stamps.
 #pragma once
 
 #include "calibration/calibration.h"
@@ -9,7 +9,7 @@
 namespace wasp::calibration {
 
 struct DelayOptions {
-  std::string folder{};
+  std::vector<std::string> folders{};
   std::string against = "best";  ///< best | gyro | poses
   DelayParams fit{};
 };

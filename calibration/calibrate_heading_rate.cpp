@@ -25,7 +25,8 @@ double delay_s(const HeadingRateOptions& options, const drivers::Recording& reco
   const auto turns = image_turns(recording, [&](double share) { bar.show(0.5 * share, "delay of the camera"); });
   DelayParams params;
   params.max_sigma_s = 0.01;  // of a slow turn 10 ms change little
-  const DelayFit fit = fit_delay(turns, source, params, {false, false, true, false, false, false});
+  const DelayRun run{turns, source};
+  const DelayFit fit = fit_delay({&run, 1}, params, {false, false, true, false, false, false});
   if (!fit.ok())
     throw Refusal("the camera's delay is not known (give --delay-ms) and this run does not tell it: " + fit.refusal);
   return fit.delay_s;

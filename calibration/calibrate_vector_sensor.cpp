@@ -20,11 +20,12 @@ namespace {
 using Eigen::Vector3d;
 using Points = std::vector<EllipsoidSample>;
 
-constexpr double kLeastEigenvalue = 0.01;  ///< an error of the model is then magnified at most tenfold
-constexpr double kWidestGap_rad = 1.31;    ///< 75 degrees; six faces of a cube leave 55
-constexpr double kLeastSpan_degc = 5;      ///< of temperature, before a slope is looked for
-constexpr double kLeastUsed = 0.6;         ///< share of samples that must agree
-constexpr std::size_t kMostPerCell = 80;   ///< a direction that was held long must not outweigh the others
+constexpr double kLeastEigenvalue = 0.01;      ///< an error of the model is then magnified at most tenfold
+constexpr double kWeakestEigenvalue = 0.0025;  ///< twentyfold, where the model leaves little to be magnified
+constexpr double kWidestGap_rad = 1.31;        ///< 75 degrees; six faces of a cube leave 55
+constexpr double kLeastSpan_degc = 5;          ///< of temperature, before a slope is looked for
+constexpr double kLeastUsed = 0.6;             ///< share of samples that must agree
+constexpr std::size_t kMostPerCell = 80;       ///< a direction that was held long must not outweigh the others
 constexpr std::size_t kMostAtFirst = 4000;
 
 double degrees(double rad) { return rad * 180 / std::numbers::pi; }
@@ -136,24 +137,39 @@ double temperature_span(const Samples& s) {
   return *high - *low;
 }
 
-/// The richest model the readings determine.
+/// An error of the model moves no value far: it is magnified little, or what the fit leaves is small even magnified.
+bool determined(const Ellipsoid& e, double most_sigma) {
+  if (e.least_eigenvalue >= kLeastEigenvalue) return true;
+  const auto used = static_cast<double>(e.used_count);
+  const double error = e.residual_rms / e.norm * std::sqrt(used / std::max(used - e.model.parameters(), 1.0));
+  return e.least_eigenvalue >= kWeakestEigenvalue && error <= most_sigma * std::sqrt(e.least_eigenvalue);
+}
+
+/// `model` where the readings determine it and it does not take a tenth of them for outliers, else what there was.
+Ellipsoid richer(const EllipsoidModel& model, const Points& points, const Ellipsoid& than, double noise,
+                 double most_sigma) {
+  if (static_cast<int>(points.size()) < model.parameters() + std::max(3, model.parameters() / 3)) return than;
+  const auto e = fit_ellipsoid(points, model, than.norm, noise);
+  return e && determined(*e, most_sigma) && e->used_count * 10 >= than.used_count * 9 ? *e : than;
+}
+
+bool may_drift(const VectorSensorOptions& o, const Samples& s) {
+  return o.temperature == "auto" && temperature_span(s) >= kLeastSpan_degc;
+}
+
+/// The richest model the readings determine. A drift passes for outliers of a model without it, so cross-axis terms
+/// that were turned down are tried once more beside it.
 Ellipsoid best_model(const VectorSensorOptions& o, const Samples& s, const Points& points, Ellipsoid axes,
                      double noise) {
-  const auto spare = [&](const EllipsoidModel& m) {
-    return static_cast<int>(points.size()) >= m.parameters() + std::max(3, m.parameters() / 3);
-  };
-  const auto richer = [&](EllipsoidModel m, const Ellipsoid& than) {
-    if (!spare(m)) return than;
-    const auto e = fit_ellipsoid(points, m, than.norm, noise);
-    return e && e->least_eigenvalue >= kLeastEigenvalue && e->used_count * 10 >= than.used_count * 9 ? *e : than;
-  };
+  const bool cross_axis = o.model != "axes", drift = may_drift(o, s);
   Ellipsoid best = std::move(axes);
-  if (o.model != "axes") best = richer({true, false}, best);
+  const auto consider = [&](EllipsoidModel model) { best = richer(model, points, best, noise, o.sensor.most_sigma); };
+  if (cross_axis) consider({true, false});
+  if (drift) consider({best.model.cross_axis, true});
+  if (cross_axis && drift && !best.model.cross_axis) consider({true, true});
   if (o.model == "full" && !best.model.cross_axis)
     throw Refusal(
         fmt::format("{} readings do not determine cross-axis terms; --model axes leaves them out", points.size()));
-  if (o.temperature == "auto" && temperature_span(s) >= kLeastSpan_degc)
-    best = richer({best.model.cross_axis, true}, best);
   return best;
 }
 
@@ -205,7 +221,13 @@ Solution solve_vector_sensor(const VectorSensorOptions& o, ProgressBar& bar) {
   check_fit(e, o.sensor, points.size());
   const auto to_flight = to_flight_unit(s.unit);
   if (o.sensor.norm <= 0 && to_flight) e = with_mean_scale_kept(std::move(e), *to_flight);
-  return vector_sensor_solution(o.sensor, s, points, e);
+  Solution solution = vector_sensor_solution(o.sensor, s, points, e);
+  if (may_drift(o, s) && !e.model.temperature)
+    solution.notes.push_back(fmt::format(
+        "the temperature changed by {:.0f} degrees and these readings do not tell what it did: a drift may pass for "
+        "neutrals, scales or cross-axis terms; turn to every side while it is cold and again while it is warm",
+        temperature_span(s)));
+  return solution;
 }
 
 std::function<Solution(ProgressBar&)> prepare_accel(CLI::App& app) {

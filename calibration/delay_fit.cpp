@@ -24,23 +24,38 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-/// The pairs that take part at every delay of the search, and what was seen in them.
+/// The pairs that take part at every delay of the search, and what was seen in them; recordings one after the other.
 struct Data {
+  std::span<const DelayRun> runs;
   std::vector<TimeNs> from_ns, until_ns;
+  std::vector<std::size_t> run;                  ///< of each pair
+  MatrixXd in_run;                               ///< 1 where the pair (row) is of the recording (column)
+  bool axes_known = true, over_floor = true;     ///< in all of them
   std::array<std::array<VectorXd, 6>, 2> image;  ///< by estimate (rotation, epipolar) and channel [1/s]
   [[nodiscard]] Eigen::Index size() const { return static_cast<Eigen::Index>(from_ns.size()); }
 };
 
-Data gather(const std::vector<ImageTurn>& turns, const TurnSource& source, DurationNs reach_ns) {
-  std::vector<const ImageTurn*> used;
-  for (const ImageTurn& turn : turns)
-    if (turn.valid && (!source.over_floor() || turn.centre.allFinite()) &&
-        source.mean_rate(turn.first_ns - reach_ns, turn.second_ns - reach_ns) &&
-        source.mean_rate(turn.first_ns + reach_ns, turn.second_ns + reach_ns) &&
-        source.mean_rate(turn.first_ns - reach_ns, turn.second_ns + reach_ns))
-      used.push_back(&turn);
+/// The sensor's record reaches over the pair at every delay up to `reach_ns`.
+bool comparable(const ImageTurn& turn, const TurnSource& source, bool over_floor, DurationNs reach_ns) {
+  return turn.valid && (!over_floor || turn.centre.allFinite()) &&
+         source.mean_rate(turn.first_ns - reach_ns, turn.second_ns - reach_ns) &&
+         source.mean_rate(turn.first_ns + reach_ns, turn.second_ns + reach_ns) &&
+         source.mean_rate(turn.first_ns - reach_ns, turn.second_ns + reach_ns);
+}
+
+Data gather(std::span<const DelayRun> runs, DurationNs reach_ns) {
   Data data;
+  data.runs = runs;
+  for (const DelayRun& run : runs) {
+    data.axes_known = data.axes_known && run.source.axes_known();
+    data.over_floor = data.over_floor && run.source.over_floor();
+  }
+  std::vector<const ImageTurn*> used;
+  for (std::size_t r = 0; r < runs.size(); ++r)
+    for (const ImageTurn& turn : runs[r].turns)
+      if (comparable(turn, runs[r].source, data.over_floor, reach_ns)) used.push_back(&turn), data.run.push_back(r);
   const auto n = static_cast<Eigen::Index>(used.size());
+  data.in_run = MatrixXd::Zero(n, static_cast<Eigen::Index>(runs.size()));
   for (auto& estimate : data.image)
     for (VectorXd& axis : estimate) axis.resize(n);
   for (Eigen::Index i = 0; i < n; ++i) {
@@ -48,6 +63,7 @@ Data gather(const std::vector<ImageTurn>& turns, const TurnSource& source, Durat
     const double dt = to_seconds(turn.second_ns - turn.first_ns);
     data.from_ns.push_back(turn.first_ns);
     data.until_ns.push_back(turn.second_ns);
+    data.in_run(i, static_cast<Eigen::Index>(data.run[static_cast<std::size_t>(i)])) = 1;
     for (int a = 0; a < 3; ++a) {
       data.image[0][static_cast<std::size_t>(a)][i] = turn.rotation_rad[a] / dt;
       data.image[1][static_cast<std::size_t>(a)][i] = turn.epipolar_rad[a] / dt;
@@ -58,11 +74,12 @@ Data gather(const std::vector<ImageTurn>& turns, const TurnSource& source, Durat
 }
 
 /// Mean rates of the sensor over the pairs at a delay; one row a pair.
-MatrixXd gyro_at(const Data& data, const TurnSource& source, double delay_s) {
+MatrixXd gyro_at(const Data& data, double delay_s) {
   const DurationNs delay_ns = from_seconds(delay_s);
   MatrixXd rates(data.size(), 6);
   for (Eigen::Index i = 0; i < data.size(); ++i) {
     const auto k = static_cast<std::size_t>(i);
+    const TurnSource& source = data.runs[data.run[k]].source;
     const auto rate = source.mean_rate(data.from_ns[k] - delay_ns, data.until_ns[k] - delay_ns);
     rates.row(i) = rate.value_or(MotionRates::Zero()).transpose();
   }
@@ -75,25 +92,28 @@ struct Regression {
   double scale = 0, bias = 0;
 };
 
-/// y on the gyro's own axis (known axes; a scale below zero is none) or on all three, and a constant; rows by weight.
-Regression regress(const VectorXd& y, const MatrixXd& gyro, int axis, bool axes_known, const VectorXd& weights) {
-  MatrixXd X(y.size(), axes_known ? 2 : 4);
-  X.col(0).setOnes();
-  if (axes_known)
-    X.col(1) = gyro.col(axis);
+/// y on the gyro's own axis (known axes; a scale below zero is none) or on all three, and a constant for each
+/// recording; rows by weight.
+Regression regress(const VectorXd& y, const MatrixXd& gyro, int axis, const Data& data, const VectorXd& weights) {
+  const Eigen::Index runs = data.in_run.cols();
+  MatrixXd X(y.size(), runs + (data.axes_known ? 1 : 3));
+  X.leftCols(runs) = data.in_run;
+  if (data.axes_known)
+    X.col(runs) = gyro.col(axis);
   else
     X.rightCols(3) = gyro.leftCols(3);
   const VectorXd root = weights.cwiseSqrt();
-  const double sum = std::max(weights.sum(), 1e-9), mean = weights.dot(y) / sum;
+  const VectorXd sums = (data.in_run.transpose() * weights).cwiseMax(1e-9);
+  const VectorXd means = data.in_run * (data.in_run.transpose() * weights.cwiseProduct(y)).cwiseQuotient(sums);
   Regression r;
-  r.total_squares = (weights.array() * (y.array() - mean).square()).sum();
+  r.total_squares = (weights.array() * (y - means).array().square()).sum();
   const VectorXd beta = (root.asDiagonal() * X).colPivHouseholderQr().solve(root.asDiagonal() * y);
-  const bool follows = !axes_known || beta[1] > 0;
-  r.fitted = follows ? VectorXd(X * beta) : VectorXd::Constant(y.size(), mean);
+  const bool follows = !data.axes_known || beta[runs] > 0;
+  r.fitted = follows ? VectorXd(X * beta) : means;
   r.residual = y - r.fitted;
   r.residual_squares = (weights.array() * r.residual.array().square()).sum();
-  r.scale = axes_known ? beta[1] : std::nan("");
-  r.bias = beta[0];
+  r.scale = data.axes_known ? beta[runs] : std::nan("");
+  r.bias = beta.head(runs).mean();
   return r;
 }
 
@@ -107,14 +127,14 @@ struct Channel {
 
 class Profile {
  public:
-  Profile(const Data& data, const TurnSource& source) : data_(data), source_(source) {}
+  explicit Profile(const Data& data) : data_(data) {}
 
   [[nodiscard]] Regression fit(const Channel& c, const MatrixXd& gyro) const {
-    return regress(image(c), gyro, c.axis, source_.axes_known(), c.weights);
+    return regress(image(c), gyro, c.axis, data_, c.weights);
   }
   /// Log likelihood of a delay over no relation.
   [[nodiscard]] double at(double delay_s, const std::vector<Channel>& channels) const {
-    const MatrixXd gyro = gyro_at(data_, source_, delay_s);
+    const MatrixXd gyro = gyro_at(data_, delay_s);
     double sum = 0;
     for (const Channel& c : channels) {
       const Regression r = fit(c, gyro);
@@ -129,7 +149,6 @@ class Profile {
 
  private:
   const Data& data_;
-  const TurnSource& source_;
 };
 
 struct Peak {
@@ -167,9 +186,9 @@ VectorXd inliers(const VectorXd& residual) {
 
 /// Of both estimates of an axis the one that follows the gyro better at its own best delay.
 std::vector<Channel> choose(const Data& data, const Profile& profile, const std::vector<double>& grid,
-                            const ChannelChoice& choice, bool over_floor) {
+                            const ChannelChoice& choice) {
   std::vector<Channel> chosen;
-  for (int axis = 0; axis < (over_floor ? 6 : 3); ++axis) {
+  for (int axis = 0; axis < (data.over_floor ? 6 : 3); ++axis) {
     if (!choice[static_cast<std::size_t>(axis)]) continue;
     Channel best;
     double highest = -1e300;
@@ -225,6 +244,32 @@ double curvature_sigma(const Profile& profile, const std::vector<Channel>& chann
   return bend < 0 ? 1 / std::sqrt(-bend) : 1.0;
 }
 
+/// The best delay of each recording, with scales of its own.
+std::vector<RunDelay> each_alone(const Data& data, const Profile& profile, const std::vector<Channel>& channels,
+                                 const std::vector<double>& grid, double common_s) {
+  std::vector<RunDelay> out;
+  for (Eigen::Index r = 0; r < data.in_run.cols(); ++r) {
+    std::vector<Channel> own = channels;
+    for (Channel& c : own) c.weights = c.weights.cwiseProduct(data.in_run.col(r));
+    const Peak peak = highest(profile, own, grid);
+    out.push_back({static_cast<std::size_t>(data.in_run.col(r).sum()), peak.delay_s,
+                   std::max(peak.height - profile.at(common_s, own), 0.0)});
+  }
+  return out;
+}
+
+/// Middle of each pair since the first, recordings end to end.
+std::vector<double> times_of(const Data& data) {
+  std::vector<double> times;
+  double before_s = 0;
+  std::size_t first = 0;
+  for (std::size_t k = 0; k < data.run.size(); ++k) {
+    if (data.run[k] != data.run[first]) before_s = times.back(), first = k;
+    times.push_back(before_s + 0.5 * to_seconds(data.from_ns[k] + data.until_ns[k] - 2 * data.from_ns[first]));
+  }
+  return times;
+}
+
 double rms_about_mean(const VectorXd& v) {
   return v.size() == 0 ? 0 : std::sqrt((v.array() - v.mean()).square().mean());
 }
@@ -245,6 +290,26 @@ AxisFit axis_fit(const Profile& profile, const Channel& c, const MatrixXd& gyro)
   return a;
 }
 
+std::string list_of(const std::vector<RunDelay>& runs) {
+  std::string out;
+  for (const RunDelay& run : runs) out += fmt::format(" {:.1f} ms", 1e3 * run.delay_s);
+  return out;
+}
+
+/// Why recordings may not be fitted together; empty: they may.
+std::string quarrel_of(const DelayFit& fit, const DelayParams& p) {
+  for (std::size_t r = 0; r < fit.runs.size(); ++r)
+    if (fit.runs[r].frames == 0)
+      return fmt::format("recording {} of {} has no pair of frames within its sensor's record: leave it out", r + 1,
+                         fit.runs.size());
+  const double most = p.most_discord + static_cast<double>(fit.runs.size());
+  if (fit.discord <= most) return "";
+  return fmt::format(
+      "the recordings do not agree: alone they say{} (likelihood gained {:.1f}, at most {:.0f}); they must be of one "
+      "camera with one setting",
+      list_of(fit.runs), fit.discord, most);
+}
+
 /// Why the answer may not be used; empty: it may.
 std::string refusal_of(const DelayFit& fit, const DelayParams& p) {
   double turned = 0;
@@ -259,6 +324,7 @@ std::string refusal_of(const DelayFit& fit, const DelayParams& p) {
   if (std::abs(fit.delay_s) > p.search_s - 2 * kCoarse_s)
     return fmt::format("the best delay, {:.0f} ms, lies at the edge of the search: widen --search-ms",
                        1e3 * fit.delay_s);
+  if (const std::string quarrel = quarrel_of(fit, p); !quarrel.empty()) return quarrel;
   if (fit.sigma_s > p.max_sigma_s)
     return fmt::format(
         "the motion determines the delay to {:.1f} ms only (one standard deviation; at most {:.1f}); {} and too "
@@ -272,10 +338,9 @@ std::string refusal_of(const DelayFit& fit, const DelayParams& p) {
 
 }  // namespace
 
-DelayFit fit_delay(const std::vector<ImageTurn>& turns, const TurnSource& source, const DelayParams& params,
-                   const ChannelChoice& choice) {
+DelayFit fit_delay(std::span<const DelayRun> runs, const DelayParams& params, const ChannelChoice& choice) {
   DelayFit fit;
-  const Data data = gather(turns, source, from_seconds(params.search_s + 0.035));
+  const Data data = gather(runs, from_seconds(params.search_s + 0.035));
   fit.frames = static_cast<std::size_t>(data.size());
   if (data.size() < params.least_frames) {
     fit.refusal = fmt::format(
@@ -286,11 +351,11 @@ DelayFit fit_delay(const std::vector<ImageTurn>& turns, const TurnSource& source
   }
   std::vector<double> grid;
   for (double d = -params.search_s; d <= params.search_s + 1e-9; d += kCoarse_s) grid.push_back(d);
-  const Profile profile(data, source);
-  std::vector<Channel> channels = choose(data, profile, grid, choice, source.over_floor());
+  const Profile profile(data);
+  std::vector<Channel> channels = choose(data, profile, grid, choice);
   Peak peak = highest(profile, channels, grid);
   for (int round = 0; round < 2; ++round) {
-    settle(profile, gyro_at(data, source, peak.delay_s), channels);
+    settle(profile, gyro_at(data, peak.delay_s), channels);
     peak = highest(profile, channels, grid);
   }
   fit.delay_s = peak.delay_s;
@@ -305,11 +370,10 @@ DelayFit fit_delay(const std::vector<ImageTurn>& turns, const TurnSource& source
     if (std::abs(d - peak.delay_s) > std::max(4 * fit.sigma_s, 0.015))
       fit.lead = std::min(fit.lead, peak.height - fit.profile.back());
   }
-  const MatrixXd gyro = gyro_at(data, source, peak.delay_s);
-  for (Eigen::Index i = 0; i < data.size(); ++i) {
-    const auto k = static_cast<std::size_t>(i);
-    fit.time_s.push_back(0.5 * to_seconds(data.from_ns[k] + data.until_ns[k] - 2 * data.from_ns[0]));
-  }
+  const MatrixXd gyro = gyro_at(data, peak.delay_s);
+  fit.time_s = times_of(data);
+  if (runs.size() > 1) fit.runs = each_alone(data, profile, channels, grid, peak.delay_s);
+  for (const RunDelay& run : fit.runs) fit.discord += run.gain;
   for (const Channel& c : channels) {
     const auto a = static_cast<std::size_t>(c.axis);
     fit.axes[a] = axis_fit(profile, c, gyro);

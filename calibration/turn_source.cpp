@@ -9,12 +9,24 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr DurationNs kHalfWindow = 30 * kMillisecond;
+constexpr DurationNs kLongestHold = 20 * kMillisecond;  ///< a pose that stays for longer says that nothing moved
 
 /// Rotation vector of the shorter way.
 Vector3d vector_of(Eigen::Quaterniond q) {
   if (q.w() < 0) q.coeffs() = -q.coeffs();
   const double sine = q.vec().norm();
   return sine < 1e-12 ? Vector3d(2 * q.vec()) : Vector3d(2 * std::atan2(sine, q.w()) / sine * q.vec());
+}
+
+/// Poses without those that only repeat the last one.
+std::vector<drivers::PoseSample> news(const std::vector<drivers::PoseSample>& poses) {
+  std::vector<drivers::PoseSample> out;
+  for (const auto& pose : poses)
+    if (out.empty() || pose.position_m != out.back().position_m ||
+        pose.q_world_sensor.coeffs() != out.back().q_world_sensor.coeffs() ||
+        pose.time_ns - out.back().time_ns >= kLongestHold)
+      out.push_back(pose);
+  return out;
 }
 
 /// Slopes of turn (the sensor's axes) and position (the world's) about pose i.
@@ -74,13 +86,13 @@ TurnSource TurnSource::from_poses(const drivers::PoseStream& poses) {
   source.axes_known_ = poses.R_sensor_cam.has_value();
   source.over_floor_ = source.axes_known_ && poses.floor_z_m.has_value();
   const Eigen::Matrix3d R = poses.R_sensor_cam.value_or(Eigen::Matrix3d::Identity()).transpose();
-  for (std::size_t i = 1; i + 1 < poses.samples.size(); ++i) {
-    const Slopes slopes = slopes_at(poses.samples, i);
+  const std::vector<drivers::PoseSample> samples = news(poses.samples);
+  for (std::size_t i = 1; i + 1 < samples.size(); ++i) {
+    const Slopes slopes = slopes_at(samples, i);
     MotionRates rates = MotionRates::Zero();
     rates.head<3>() = R * slopes.turn_radps;
-    if (source.over_floor_)
-      rates.tail<3>() = floor_rates(poses, poses.samples[i], rates.head<3>(), slopes.velocity_mps);
-    source.add(poses.samples[i].time_ns, rates);
+    if (source.over_floor_) rates.tail<3>() = floor_rates(poses, samples[i], rates.head<3>(), slopes.velocity_mps);
+    source.add(samples[i].time_ns, rates);
   }
   return source;
 }

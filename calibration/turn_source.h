@@ -21,7 +21,8 @@ class TurnSource {
   static TurnSource from_gyro(const drivers::InertialStream& inertial);
   /// Rates at each pose are the slope of a straight line through the turns within 30 ms, or to its two neighbours:
   /// motion capture is too noisy to differentiate over less. The filter is even about the instant and so delays
-  /// nothing.
+  /// nothing. A log faster than its motion capture repeats poses: between two it would be late by half their distance,
+  /// so the repeated ones are left out.
   static TurnSource from_poses(const drivers::PoseStream& poses);
   /// The gyro where there is one, else the poses; nullopt: neither.
   static std::optional<TurnSource> best_of(const drivers::RecordingMotion& motion);

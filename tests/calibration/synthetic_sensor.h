@@ -14,8 +14,9 @@ namespace wasp::test {
 /// reads = inverse(K) * truth + neutral + slope * (T - 25) + noise
 struct FaultySensor {
   Eigen::Matrix3d K = Eigen::Matrix3d::Identity();
-  Eigen::Vector3d neutral = Eigen::Vector3d::Zero(), slope = Eigen::Vector3d::Zero();
+  Eigen::Vector3d neutral = Eigen::Vector3d::Zero();
   double noise = 0;
+  Eigen::Vector3d slope = Eigen::Vector3d::Zero();  ///< last, to be left out: Eigen leaves a vector from {} undefined
 
   [[nodiscard]] Eigen::Vector3d read(const Eigen::Vector3d& truth, sim::Random& random, double degc = 25) const {
     return K.inverse() * truth + neutral + slope * (degc - 25) +
