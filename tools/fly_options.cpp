@@ -36,11 +36,12 @@ std::string known_mission(const std::string& name) {
 
 std::optional<int> parse_fly_options(int argc, char** argv, FlyOptions& o) {
   CLI::App app{
-      "Flies a mission with the real-time flight process: in the simulator (default), on a recording with\n"
-      "--replay, or with the real camera and autopilot that --config names ([camera] driver = v4l2 | dc1394 | kinect). Writes OUT/NAME/ with log/ and report.html. Exit code 0 only if the mission was flown to its\n"
-      "end, behaviours commanded it, and every bar was met; 4: nothing failed, but it was stopped early or no "
-      "behaviour\n"
-      "ever commanded; 2: bad arguments; 1: anything else."};
+      "Flies a mission with the real-time flight process: in the simulator (default), on a recording with --replay,\n"
+      "with the autopilot that --config names and a simulated camera with --follow, or with the real camera and\n"
+      "autopilot that --config names ([camera] driver = v4l2 | dc1394 | kinect). Writes OUT/NAME/ with log/ and\n"
+      "report.html. Exit code 0 only if the mission was flown to its end, behaviours commanded it, and every bar was\n"
+      "met; 4: nothing failed, but it was stopped early or no behaviour ever commanded; 2: bad arguments; 1: anything\n"
+      "else."};
   app.name("wasp fly");
   app.option_defaults()->always_capture_default();
   app.add_option("--mission", o.mission, "what to fly (config/missions): " + mission_list())->check(known_mission);
@@ -60,7 +61,14 @@ std::optional<int> parse_fly_options(int argc, char** argv, FlyOptions& o) {
   app.add_option("--autopilot", o.autopilot,
                  "whose autopilot flies: the simulator behaves as that one, and wasp is told (docs/autopilots.md)")
       ->check(CLI::IsMember({"wasp", "px4", "ardupilot"}));
+  app.add_option("--follow", o.follow,
+                 "fly the autopilot at [autopilot] endpoint of --config (a real one, or its own simulator) with a\n"
+                 "simulated camera that goes where it says it is: by 'flight' on that line, or by a second ENDPOINT of\n"
+                 "its, as tcp://127.0.0.1:5762 (docs/services.md)")
+      ->excludes("--replay", "--autopilot")
+      ->needs("--config");
   app.add_option("--udp", o.udp_port, "link by UDP to this port in place of a serial line")
+      ->excludes("--follow")
       ->check(CLI::Range(1024, 65535));
   app.add_option("--seed", o.seed, "seed of the simulated world and noise");
   app.add_flag("--no-rt", o.no_rt, "do not ask for real time; every figure is marked 'not real time'");

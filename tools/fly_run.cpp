@@ -80,13 +80,14 @@ void write_override(Run& run, const sim::SimConfig& sim) {
   std::string text = "# written by wasp fly for this run\n[run]\n";
   text += fmt::format("enforce_real_time = {}\nstrict_syscalls = {}\n", run.real_time, run.options.strict_syscalls);
   text += fmt::format("incident_dir = \"{}\"\n", fs::absolute(run.folder / "incidents").string());
-  if (!on_hardware(run)) {
+  if (!on_hardware(run) && !follows(run)) {
     const std::string line = run.options.udp_port > 0
                                  ? fmt::format("udp://127.0.0.1:{}", run.options.udp_port)
                                  : fmt::format("serial:{}:921600", fs::absolute(run.folder / "tty").string());
     text += fmt::format("[autopilot]\nendpoint = \"{}\"\n", line);
     if (!run.options.autopilot.empty()) text += fmt::format("flavour = \"{}\"\n", run.options.autopilot);
   }
+  if (run.options.follow == "flight") text += "[telemetry]\nposition_hz = 50\n";
   if (run.options.replay.empty()) {
     const Legs legs = planned_legs(run);
     run.flight_seconds = std::accumulate(legs.seconds.begin(), legs.seconds.end(), 0.0);
@@ -134,8 +135,8 @@ Run plan_run(FlyOptions options) {
   run.mission = mission_folder(run.options.mission);
   run.instance = run.options.name;
   run.camera_driver = configured_camera(run);
-  if (on_hardware(run) && !run.options.world.empty())
-    throw std::runtime_error("--world is the simulator's, but [camera] driver = \"" + run.camera_driver +
+  if (on_hardware(run) && (!run.options.world.empty() || follows(run)))
+    throw std::runtime_error("--world and --follow are the simulator's, but [camera] driver = \"" + run.camera_driver +
                              "\" is a real camera");
   if (fs::exists(run.folder / "run.json") || fs::exists(run.folder / "log/imu.csv"))
     throw std::runtime_error(run.folder.string() +
@@ -190,7 +191,25 @@ std::vector<std::string> flight_arguments(const Run& run) {
   return a;
 }
 
+bool follows(const Run& run) { return !run.options.follow.empty(); }
+
+/// The camera alone, led by the pose of the vehicle that another program flies.
+std::vector<std::string> following_sim_arguments(const Run& run) {
+  std::vector<std::string> a{program("wasp-sim"),
+                             "--instance",
+                             run.instance,
+                             "--follow",
+                             run.options.follow,
+                             "--config",
+                             (run.mission / "sim.toml").string(),
+                             "--seed",
+                             std::to_string(run.options.seed)};
+  if (!run.options.world.empty()) a.insert(a.end(), {"--world", run.options.world});
+  return a;
+}
+
 std::vector<std::string> sim_arguments(const Run& run) {
+  if (follows(run)) return following_sim_arguments(run);
   std::vector<std::string> a{
       program("wasp-sim"),
       "--instance",
@@ -202,10 +221,12 @@ std::vector<std::string> sim_arguments(const Run& run) {
       "--seed",
       std::to_string(run.options.seed)};
   if (!run.options.world.empty()) a.insert(a.end(), {"--world", run.options.world});
-  if (!run.options.autopilot.empty()) a.insert(a.end(), {"--autopilot", run.options.autopilot});
+  const auto autopilot = scheduling::load_guard_plan(configuration_files(run)).autopilot;
+  const std::string flavour(drivers::facts_of(autopilot.flavour).name);
+  a.insert(a.end(), {"--autopilot", run.options.autopilot.empty() ? flavour : run.options.autopilot});
   if (!run.options.replay.empty()) a.push_back("--no-camera");
   if (!run.options.safety_pilot) a.push_back("--no-safety-pilot");
-  const auto signing = scheduling::load_guard_plan(configuration_files(run)).autopilot.signing;
+  const auto& signing = autopilot.signing;
   if (signing.mode != "off") a.insert(a.end(), {"--signing-key", signing.key_file});
   return a;
 }

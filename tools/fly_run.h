@@ -43,6 +43,8 @@ std::vector<std::string> sim_arguments(const Run& run);
 std::vector<std::string> camera_arguments(const Run& run);
 /// True where a real camera looks and the configured autopilot flies: nothing is simulated.
 bool on_hardware(const Run& run);
+/// True where the configured autopilot flies and only the camera is simulated.
+bool follows(const Run& run);
 std::vector<std::string> recorder_arguments(const Run& run);
 
 /// Throws std::runtime_error naming the path.

@@ -31,6 +31,7 @@ double allowed_share(const Run& run) { return run.real_time && rt::kernel_is_pre
 
 std::string camera_text(const Run& run) {
   if (!run.options.replay.empty()) return "recording " + run.options.replay;
+  if (follows(run)) return "simulated Kinect, led by " + run.options.follow;
   return on_hardware(run) ? "real, " + run.camera_driver : "simulated Kinect";
 }
 
@@ -84,7 +85,7 @@ std::vector<Result> judged_by_mission(const Run& run) {
 /// What this mission must show beyond being flown to its end. One that was cut short, by an interrupt or by --seconds,
 /// is reported but not judged: nobody flies 60 m in ten seconds.
 std::vector<Result> mission_results(const Run& run, const std::vector<Phase>& phases, bool cut_short) {
-  if (!run.options.replay.empty() || on_hardware(run)) return {};  // nobody knows the truth
+  if (!run.options.replay.empty() || on_hardware(run) || follows(run)) return {};  // nobody knows the truth
   if (run.options.mission == "hover") return hover_results(run.folder / "log", phases);
   auto results = judged_by_mission(run);
   if (cut_short || run.options.seconds > 0)

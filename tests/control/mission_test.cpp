@@ -121,6 +121,25 @@ TEST(Mission, ALandingThatNeverEndsIsBrokenOff) {
   EXPECT_EQ(v.state.early_end, EarlyEnd::kNoGround);
 }
 
+/// A height that drifts, as an autopilot's own estimate does: the ground is not where it was.
+TEST(Mission, WhatDoesNotMoveThoughAskedDownStands) {
+  Obedient v = standing();
+  v.run(60);
+  v.input.stop_requested = true;
+  for (int i = 0; i < 20 && v.state.phase != MissionPhase::kLand; ++i) v.step();
+  ASSERT_EQ(v.state.phase, MissionPhase::kLand);
+  for (int i = 0; i < 40; ++i) {  // two seconds of sinking, then 0.3 m above where it started from
+    v.step();
+    v.input.height_m = std::max(0.5f, 0.9f - 0.01f * static_cast<float>(i));
+    ASSERT_EQ(v.state.phase, MissionPhase::kLand);
+  }
+  for (int i = 0; i < 70 && v.state.phase == MissionPhase::kLand; ++i) {
+    v.step();
+    v.input.height_m = i % 2 == 0 ? 0.5f : 0.52f;
+  }
+  EXPECT_EQ(v.state.phase, MissionPhase::kDisarm);
+}
+
 TEST(Mission, GivesUpWhenTheGroundIsNeverSeen) {
   Obedient v;
   v.run(static_cast<int>(v.params.patience_s * 20) + 10);

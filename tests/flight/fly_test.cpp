@@ -333,12 +333,29 @@ INSTANTIATE_TEST_SUITE_P(Autopilots, FlyAs,
                            return std::string(of.param.flavour) + (of.param.udp ? "_udp" : "_serial");
                          });
 
+/// Vehicle and autopilot are a program of their own; of wasp fly are the flight and a camera that goes along.
+TEST(Fly, AnAutopilotOfItsOwnByTheEyesOfACameraThatFollowsIt) {
+  const TemporaryFolder out;
+  const std::string port = std::to_string(free_udp_port());
+  Program vehicle({program_path("wasp-sim"), "--instance", unique("other"), "--no-camera", "--autopilot", "ardupilot", "--udp",
+                   "127.0.0.1:" + port});
+  const fs::path config = out.path / "other.toml";
+  std::ofstream(config) << "[autopilot]\nflavour = \"ardupilot\"\nendpoint = \"udp://127.0.0.1:" << port << "\"\n";
+  const std::string name = fly_to_the_end(out, "follow", "--seconds 12 --follow flight --config " + config.string());
+  const std::string log = read_text(out.path / name / "log/flight.txt");
+  EXPECT_NE(log.find("mission flown to its end"), std::string::npos) << log;
+  const auto run = nlohmann::json::parse(read_text(out.path / name / "run.json"));
+  EXPECT_NE(run.dump().find("led by flight"), std::string::npos) << run.dump(1);
+}
+
 TEST(FlyRefuses, AnAutopilotThatIsNotTheOneConfigured) {
   const TemporaryFolder out;
-  const std::string name = unique("wrong");
+  const std::string name = unique("wrong"), port = std::to_string(free_udp_port());
+  Program vehicle({program_path("wasp-sim"), "--instance", unique("other"), "--no-camera", "--udp", "127.0.0.1:" + port});
   const fs::path config = out.path / "wrong.toml";
-  std::ofstream(config) << "[autopilot]\nflavour = \"px4\"\n[mission]\npatience_s = 4\n";
-  run_shell(fly(out, name, "--seconds 5 --config " + config.string()));
+  std::ofstream(config) << "[autopilot]\nflavour = \"px4\"\nendpoint = \"udp://127.0.0.1:" << port
+                        << "\"\n[mission]\npatience_s = 4\n";
+  run_shell(fly(out, name, "--seconds 5 --follow flight --config " + config.string()));
   const std::string log = read_text(out.path / name / "log/flight.txt");
   EXPECT_NE(log.find("the autopilot says MAV_AUTOPILOT 0, autopilot.flavour says px4"), std::string::npos) << log;
   EXPECT_NE(log.find("not arming: the autopilot is not the one"), std::string::npos) << log;
