@@ -96,6 +96,20 @@ Solution solution_of(const DelayFit& fit, const std::vector<DelayRun>& runs) {
   return out;
 }
 
+/// The recordings in a folder that holds nothing but several; else that folder itself.
+std::vector<std::filesystem::path> recordings_in(const std::filesystem::path& folder) {
+  std::vector<std::filesystem::path> inside;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    const std::string extension = entry.path().extension().string();
+    if (entry.is_directory())
+      inside.push_back(entry.path());
+    else if (extension != ".md" && !extension.empty())
+      return {folder};
+  }
+  std::sort(inside.begin(), inside.end());
+  return inside.size() < 2 ? std::vector{folder} : inside;
+}
+
 /// One kind of sensor for all of them: a delay behind one is not that behind the other.
 std::string against_of(const std::vector<drivers::Recording>& recordings, const std::string& asked) {
   const auto with_gyro = std::count_if(recordings.begin(), recordings.end(),
@@ -118,7 +132,8 @@ TurnSource turn_source_of(const drivers::Recording& recording, const std::string
 
 Solution solve_delay(const DelayOptions& options, ProgressBar& bar) {
   std::vector<drivers::Recording> recordings;
-  for (const auto& folder : options.folders) recordings.push_back(drivers::Recording::open(folder));
+  for (const auto& folder : options.folders)
+    for (const auto& inside : recordings_in(folder)) recordings.push_back(drivers::Recording::open(inside));
   const std::string against = against_of(recordings, options.against);
   std::vector<DelayRun> runs;
   for (const auto& recording : recordings) {
@@ -145,7 +160,7 @@ std::function<Solution(ProgressBar&)> prepare_delay(CLI::App& app) {
   auto search_ms = std::make_shared<double>(1e3 * options->fit.search_s),
        sigma_ms = std::make_shared<double>(1e3 * options->fit.max_sigma_s);
   app.add_option("DIR", options->folders,
-                 "recordings of one camera with grey images and a gyro or true poses (`wasp recording DIR`)")
+                 "recordings of one camera with grey images and a gyro or true poses (`wasp recording DIR`), or a folder of such")
       ->required();
   app.add_option("--against", options->against, "what to hold the images against: the gyro if there is one, or")
       ->check(CLI::IsMember({"best", "gyro", "poses"}));
