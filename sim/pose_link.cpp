@@ -14,6 +14,7 @@ constexpr DurationNs kBeat = kSecond, kSync = 100 * kMillisecond, kAsk = 2 * kSe
                      kQuiet = 10 * kSecond;
 constexpr int kOften = 10;        // questions at the short interval
 constexpr int kStreamsAfter = 2;  // questions before the old way of asking is tried as well
+constexpr double kArmedHz = 5;  ///< of HEARTBEAT: until it says armed the vehicle is kept at the start
 constexpr double kEnough = 0.7;   // of the rate asked for
 constexpr std::uint8_t kStreamPosition = 6, kStreamExtra1 = 10;  // MAV_DATA_STREAM: position, attitude
 
@@ -198,16 +199,18 @@ void PoseLink::ask(TimeNs now_ns, std::vector<std::uint8_t>& out) {
   ask_due_ns_ = now_ns + (asked_ < kOften ? kAsk : kAskSeldom);
   const double enough_hz = kEnough * params_.rate_hz;
   if (asked_ > 0 && pose_.attitude_rate_hz(now_ns) >= enough_hz && pose_.position_rate_hz(now_ns) >= enough_hz) return;
-  const auto interval = [&](std::uint32_t id) {
+  const auto interval = [&](std::uint32_t id, double hz) {
     CommandLong m;
     m.command = mav_cmd::kSetMessageInterval;
     m.param1 = static_cast<float>(id);
-    m.param2 = static_cast<float>(std::lround(1e6 / params_.rate_hz));
+    m.param2 = static_cast<float>(std::lround(1e6 / hz));
     m.target_system = params_.system_id;
     m.target_component = mav_component::kCompIdAutopilot1;
     send(m, out);
   };
-  for (const std::uint32_t id : {AttitudeQuaternion::kId, Attitude::kId, LocalPositionNed::kId}) interval(id);
+  for (const std::uint32_t id : {AttitudeQuaternion::kId, Attitude::kId, LocalPositionNed::kId})
+    interval(id, params_.rate_hz);
+  interval(Heartbeat::kId, kArmedHz);  // ArduPilot obliges, PX4 does not
   if (++asked_ <= kStreamsAfter) return;
   for (const std::uint8_t stream : {kStreamPosition, kStreamExtra1}) {
     RequestDataStream m;
