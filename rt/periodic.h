@@ -73,6 +73,12 @@ class PeriodicGrid {
   std::uint64_t burst_left_ = kCatchUpBurst;
 };
 
+/// The first release after the one due at `due_ns` that is not yet due at `now_ns`: what a thread that skips waits for.
+constexpr TimeNs next_due(TimeNs due_ns, DurationNs period_ns, TimeNs now_ns) WASP_REALTIME {
+  const TimeNs next_ns = due_ns + period_ns;
+  return now_ns <= next_ns ? next_ns : next_ns + (now_ns - next_ns + period_ns - 1) / period_ns * period_ns;
+}
+
 /// Sleeps to the next release of the grid; an overdue one is returned at once. Realtime-safe: yes.
 inline Release wait_next(PeriodicGrid& grid) WASP_REALTIME {
   Release release = grid.next(now());

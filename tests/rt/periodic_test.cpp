@@ -85,6 +85,16 @@ TEST(PeriodicGrid, NeverReleasesThePastAndNeverMovesOverAnyStall) {
   }
 }
 
+TEST(PeriodicGrid, WhatIsDueNextIsWhatSkippingWaitsFor) {
+  constexpr DurationNs kTick = 50 * kMillisecond;
+  for (const DurationNs stall : {DurationNs{1}, 49 * kMillisecond, kTick, kTick + 1, 100 * kMillisecond, 130 * kMillisecond}) {
+    PeriodicGrid grid(kSecond, kTick);
+    const Release first = grid.next(kSecond);
+    const TimeNs now_ns = first.due_at_ns + stall;
+    EXPECT_EQ(next_due(first.due_at_ns, kTick, now_ns), grid.next(now_ns).due_at_ns) << stall;
+  }
+}
+
 TEST(PeriodicGrid, NoDriftAfterAYearOfTicks) {
   PeriodicGrid grid(kStart, kPeriod);
   constexpr std::uint64_t kYear = 20ull * 3600 * 24 * 365;
