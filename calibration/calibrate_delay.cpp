@@ -160,7 +160,8 @@ std::function<Solution(ProgressBar&)> prepare_delay(CLI::App& app) {
   auto search_ms = std::make_shared<double>(1e3 * options->fit.search_s),
        sigma_ms = std::make_shared<double>(1e3 * options->fit.max_sigma_s);
   app.add_option("DIR", options->folders,
-                 "recordings of one camera with grey images and a gyro or true poses (`wasp recording DIR`), or a folder of such")
+                 "recordings of one camera with grey images and a gyro or true poses (`wasp recording DIR`), or a "
+                 "folder of such")
       ->required();
   app.add_option("--against", options->against, "what to hold the images against: the gyro if there is one, or")
       ->check(CLI::IsMember({"best", "gyro", "poses"}));

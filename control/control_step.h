@@ -75,7 +75,7 @@ struct ControlState {
   float held_yaw_rad = 0;
   bool holding_yaw = false;
   HoverShareState hover;
-  TimeNs stopping_since_ns = kNever;  ///< failsafe by silence: its level last words began
+  TimeNs stopping_since_ns = kNever;              ///< failsafe by silence: its level last words began
   float heading_rad = 0, heading_before_rad = 0;  ///< commanded, where the heading is commanded: of this tick, the last
   bool heading_held = false;
   Setpoint sent, sent_before;  ///< of this tick and of the one before

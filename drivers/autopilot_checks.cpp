@@ -22,9 +22,14 @@ enum Px4Parameter : std::size_t {
 constexpr std::array<std::string_view, 8> kPx4Names{"MPC_THR_HOVER", "COM_OF_LOSS_T",  "COM_OBL_RC_ACT", "COM_OBL_ACT",
                                                     "MAV_FWDEXTSP",  "COM_RC_IN_MODE", "COM_RCL_EXCEPT", "NAV_DLL_ACT"};
 
-constexpr std::array<std::string_view, 8> kLossActs{"position mode, without a radio return", "altitude mode, without a radio return",
-                                                    "manual mode, without a radio return", "return",
-                                                    "it lands",      "hold",          "it terminates", "it disarms"};
+constexpr std::array<std::string_view, 8> kLossActs{"position mode, without a radio return",
+                                                    "altitude mode, without a radio return",
+                                                    "manual mode, without a radio return",
+                                                    "return",
+                                                    "it lands",
+                                                    "hold",
+                                                    "it terminates",
+                                                    "it disarms"};
 constexpr std::array<std::string_view, 5> kLossActsNoRadio{"it lands", "hold", "return", "it terminates", "lockdown"};
 
 constexpr unsigned kExceptOffboard = 4;  ///< bit of COM_RCL_EXCEPT
@@ -101,8 +106,8 @@ Verdict judge_px4(const CheckContext& c, const Readings& r) noexcept {
   return v;
 }
 
-/// True if the thrust field is thrust. Where that cannot be told it asks for GUID_OPTIONS to be written without the bit,
-/// and refuses until it is: a development version of 4.1 reads back a default that nobody set.
+/// True if the thrust field is thrust. Where that cannot be told it asks for GUID_OPTIONS to be written without the
+/// bit, and refuses until it is: a development version of 4.1 reads back a default that nobody set.
 bool thrust_is_thrust(const CheckContext& c, const Readings& r, Verdict& v) noexcept {
   const auto bit = [](const Reading& reading, double end, unsigned mask) noexcept {
     const bool sane = reading.state == ReadingState::kKnown && reading.value >= 0 && reading.value < end &&
@@ -150,8 +155,7 @@ Verdict judge_copter(const CheckContext& c, const Readings& r) noexcept {
     v.refusal = because("GUID_TIMEOUT", at(r, kGuidTimeout).value,
                         "the last setpoint would be flown on for so long after the stream ended; set it to 1");
   if (known(r, kAngleMax_cdeg) && at(r, kAngleMax_cdeg).value > 0) {
-    const double degrees = at(r, kAngleMax_cdeg).value / 100,
-                 wanted = to_degrees(Radians{c.wish.max_tilt_rad}).value;
+    const double degrees = at(r, kAngleMax_cdeg).value / 100, wanted = to_degrees(Radians{c.wish.max_tilt_rad}).value;
     if (degrees < wanted - 0.05)
       v.refusal = because("ANGLE_MAX", at(r, kAngleMax_cdeg).value,
                           "less than control.max_tilt_deg, commands would be cut; raise it, or lower that");

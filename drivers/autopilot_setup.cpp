@@ -3,7 +3,7 @@
 namespace wasp::drivers {
 namespace {
 
-constexpr DurationNs kWindow = kSecond;  ///< over which the rate of attitudes is counted
+constexpr DurationNs kWindow = kSecond;              ///< over which the rate of attitudes is counted
 constexpr std::uint16_t kRequestCapabilities = 520;  ///< MAV_CMD_REQUEST_MESSAGE in releases before 2021
 
 /// A message to be sent by itself, and how often.
@@ -115,8 +115,8 @@ void AutopilotSetup::on_attitude(TimeNs now_ns) WASP_REALTIME {
   ++attitudes_;
 }
 
-/// A ground station on the same channel may set the rates of all streams again and again (MAVProxy does): they are asked
-/// for at once, before an attitude is too old.
+/// A ground station on the same channel may set the rates of all streams again and again (MAVProxy does): they are
+/// asked for at once, before an attitude is too old.
 void AutopilotSetup::watch_attitude(TimeNs now_ns) WASP_REALTIME {
   if (attitude_at_ns_ == kNever || stream_ != 0 || stream_rounds_ == 0 || now_ns - streams_asked_ns_ < kStreamsLost)
     return;

@@ -30,7 +30,7 @@ class AutopilotSetup {
   static constexpr int kTries = 10;  ///< of a question before its answer counts as absent
   static constexpr DurationNs kAskAgain = 250 * kMillisecond;
   static constexpr DurationNs kStreamsAgain = 2 * kSecond;  ///< before a stream that is missing is asked for again
-  static constexpr DurationNs kStreamsLost = 500 * kMillisecond;  ///< likewise, one that somebody else has slowed down
+  static constexpr DurationNs kStreamsLost = 500 * kMillisecond;   ///< likewise, one that somebody else has slowed down
   static constexpr DurationNs kRefreshEvery = 500 * kMillisecond;  ///< on the ground: one parameter, absent ones too
   static constexpr DurationNs kSilence = 3 * kSecond;              ///< of heartbeats; after it everything is asked anew
   static constexpr double kLeastAttitude_hz = 12;                  ///< below it attitudes are too old between two

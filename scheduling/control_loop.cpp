@@ -132,7 +132,8 @@ void ControlLoop::beat(const control::ControlInput& input, const control::Contro
   guard.commanding.store(command.sent != 0 && input.autopilot.armed ? 1 : 0, std::memory_order_relaxed);
   guard.tick.store(command.tick, std::memory_order_relaxed);
   const TimeNs now_ns = rt::now();
-  guard.next_due_ns.store(rt::next_due(command.due_at_ns, config_.control_period_ns, now_ns), std::memory_order_relaxed);
+  guard.next_due_ns.store(rt::next_due(command.due_at_ns, config_.control_period_ns, now_ns),
+                          std::memory_order_relaxed);
   guard.beat_at_ns.store(now_ns, std::memory_order_release);
 }
 

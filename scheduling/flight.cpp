@@ -140,7 +140,7 @@ class Flight {
     autopilot_.use_signing(*signing_);
     save_signing_time();
     log(config_.autopilot.signing.mode == "require" ? "the autopilot's line is signed, unsigned frames are refused"
-                                          : "what goes to the autopilot is signed");
+                                                    : "what goes to the autopilot is signed");
   }
   void save_signing_time() {
     signing_saved_at_ns_ = rt::now();

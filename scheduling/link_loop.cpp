@@ -209,8 +209,8 @@ void LinkLoop::set_up(TimeNs now_ns, RunStatus& status) WASP_REALTIME {
   if (!heartbeat_seen_) report_.store(now_);  // so that control can say what it waits for
 }
 
-/// Of an autopilot that is not asked by the setup: its mode and arming are to be known within half a second; by itself it
-/// says them once a second.
+/// Of an autopilot that is not asked by the setup: its mode and arming are to be known within half a second; by itself
+/// it says them once a second.
 void LinkLoop::ask_for_beats() WASP_REALTIME {
   if (beats_asked_ || setup_.active() || !heartbeat_seen_ || !gate_.fits(2 * kQuestionBytes, received_at_ns_)) return;
   beats_asked_ = true;
@@ -297,7 +297,6 @@ void LinkLoop::on_frame(const mavlink::Frame& frame) WASP_REALTIME {
   const bool autopilot =
       frame.system_id == self.autopilot_system_id && frame.component_id == self.autopilot_component_id;
   if (autopilot && frame.is<mavlink::LocalPositionNed>()) note_position(frame.as<mavlink::LocalPositionNed>());
-  if (setup_.on_frame(frame)) return;
   if (services_.telemetry != nullptr)
     services_.telemetry->receive(frame, received_at_ns_);
   else

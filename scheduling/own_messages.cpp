@@ -18,10 +18,6 @@ constexpr std::int16_t kNoFlow = std::numeric_limits<std::int16_t>::min();
 constexpr std::uint8_t kControlRow = 255;
 constexpr std::uint32_t kNoEvidence = 0xffffffffu;
 
-std::uint64_t microseconds(TimeNs ns) noexcept {
-  return static_cast<std::uint64_t>(std::max<TimeNs>(ns, 0) / kMicrosecond);
-}
-
 std::uint32_t short_microseconds(DurationNs ns) noexcept {
   return static_cast<std::uint32_t>(std::clamp<DurationNs>(ns / kMicrosecond, 0, kNoEvidence - 1));
 }
@@ -60,12 +56,16 @@ TimeNs told_time(const drivers::AutopilotLink& link, TimeNs local_ns) WASP_REALT
   return link.clock().synced() ? link.clock().to_remote(local_ns) : local_ns;
 }
 
+std::uint64_t told_us(const drivers::AutopilotLink& link, TimeNs local_ns) WASP_REALTIME {
+  return static_cast<std::uint64_t>(std::max<TimeNs>(told_time(link, local_ns), 0) / kMicrosecond);
+}
+
 OwnMessages::OwnMessages(const Config& c, const shm::Region& flight, drivers::AutopilotLink& link)
     : link_(link), stages_(stage_table(flight)), commands_(flight, shm::kCommand, "Command") {
   for (std::size_t i = 0; i < c.behaviours.size(); ++i)
     if (c.behaviours[i].enabled)
-      voices_.push_back({i, name_field(c.behaviours[i].name),
-                         shm::RingReader(flight, shm::cue_topic(c.behaviours[i].name), "Cue")});
+      voices_.push_back(
+          {i, name_field(c.behaviours[i].name), shm::RingReader(flight, shm::cue_topic(c.behaviours[i].name), "Cue")});
   if (flight.has(shm::kFlow)) fields_.emplace(flight, shm::kFlow, "Flow");
   part_.scale = kPixelsPerCount;
   part_.width = static_cast<std::uint16_t>(c.camera.intrinsics.width_px);
@@ -81,7 +81,7 @@ std::size_t OwnMessages::cue(std::span<std::uint8_t> out) WASP_REALTIME {
     voice.told = cue.step_index + 1;
     const CueBody& body = cue.body;
     WaspCue m;
-    m.time_usec = microseconds(told_time(link_, cue.exposed_at_ns));
+    m.time_usec = told_us(link_, cue.exposed_at_ns);
     m.frame_sequence = cue.frame_sequence;
     m.latency_us = short_microseconds(cue.finished_at_ns - cue.exposed_at_ns);
     m.quality = body.quality;
@@ -125,7 +125,7 @@ std::size_t OwnMessages::latency(TimeNs now_ns, std::span<std::uint8_t> out) WAS
     const std::string_view owner(m.name.data(), std::find(m.name.begin(), m.name.end(), '\0') - m.name.begin());
     const Stages stages = stages_of(owner, control ? "tick to byte" : "end to end");
     if (stages.compute == nullptr || stages.compute->histogram.count() == 0) continue;
-    m.time_usec = microseconds(told_time(link_, now_ns));
+    m.time_usec = told_us(link_, now_ns);
     m.samples = static_cast<std::uint32_t>(stages.compute->histogram.count());
     m.over_budget = static_cast<std::uint32_t>(stages.compute->misses.load(std::memory_order_relaxed));
     tell(stages.wake, m.wake_p50, m.wake_p99, m.wake_max);
@@ -141,10 +141,9 @@ std::size_t OwnMessages::state(std::span<std::uint8_t> out) WASP_REALTIME {
   if (!commands_.copy_newest(c) || c.tick + 1 == tick_told_) return 0;
   tick_told_ = c.tick + 1;
   WaspState m;
-  m.time_usec = microseconds(told_time(link_, c.released_at_ns));
+  m.time_usec = told_us(link_, c.released_at_ns);
   m.tick = c.tick;
-  m.evidence_age_us =
-      c.exposed_at_ns == kNever ? kNoEvidence : short_microseconds(c.released_at_ns - c.exposed_at_ns);
+  m.evidence_age_us = c.exposed_at_ns == kNever ? kNoEvidence : short_microseconds(c.released_at_ns - c.exposed_at_ns);
   m.q = c.q_ned_body;
   m.yaw_rate = c.yaw_rate_radps;
   m.thrust = c.thrust;
@@ -178,7 +177,7 @@ bool OwnMessages::begin_field() WASP_REALTIME {
     u_[i] = cell.valid != 0 ? count_of(cell.u_px) : kNoFlow;
     v_[i] = cell.valid != 0 ? count_of(cell.v_px) : kNoFlow;
   }
-  part_.time_usec = microseconds(told_time(link_, slot->shown_at_ns));
+  part_.time_usec = told_us(link_, slot->shown_at_ns);
   part_.interval_us = short_microseconds(message.exposed_at_ns - message.first_exposed_at_ns);
   part_.frame_sequence = message.frame_sequence;
   part_.flags = still ? wasp_flow_flags::kStill : 0;

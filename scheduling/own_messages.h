@@ -1,6 +1,6 @@
-// wasp's own messages on the autopilot's line (messages/wasp.xml), for ground stations that read their description: what
-// each behaviour last said, how late each thread was, what the last control tick made of it, flow fields in parts. Only
-// for those who ask, or as [telemetry] says: an autopilot hands unknown messages on to its radio.
+// wasp's own messages on the autopilot's line (messages/wasp.xml), for ground stations that read their description:
+// what each behaviour last said, how late each thread was, what the last control tick made of it, flow fields in parts.
+// Only for those who ask, or as [telemetry] says: an autopilot hands unknown messages on to its radio.
 #pragma once
 
 #include <array>
@@ -20,8 +20,11 @@ namespace wasp::scheduling {
 
 /// Autopilot's time where the clocks are matched, else ours: the magnitude tells.
 TimeNs told_time(const drivers::AutopilotLink& link, TimeNs local_ns) WASP_REALTIME;
+/// The same in whole microseconds, as messages have it.
+std::uint64_t told_us(const drivers::AutopilotLink& link, TimeNs local_ns) WASP_REALTIME;
 
-/// Each function makes one whole frame in `out` and gives its size, 0 where there is nothing new to be said. One thread.
+/// Each function makes one whole frame in `out` and gives its size, 0 where there is nothing new to be said. One
+/// thread.
 class OwnMessages {
  public:
   /// `flight`: the region with the rings of cues, commands and flow, and the table of stages. Before the start.

@@ -22,10 +22,6 @@ constexpr std::size_t kMost = M::kMaxLength + kOverhead;
 
 DurationNs interval_of(double rate_hz) noexcept { return rate_hz > 0 ? from_seconds(1 / rate_hz) : 0; }
 
-std::uint64_t microseconds(TimeNs ns) noexcept {
-  return static_cast<std::uint64_t>(std::max<TimeNs>(ns, 0) / kMicrosecond);
-}
-
 std::size_t size_of(std::uint32_t id) noexcept {
   const MessageInfo* info = find_message(id);
   return info == nullptr ? kMaxFrame : info->max_length + kOverhead;
@@ -52,7 +48,11 @@ void TelemetryInbox::tell(std::uint8_t severity, std::string_view text) noexcept
 }
 
 Telemetry::Telemetry(const Config& c, const shm::Region& flight, drivers::AutopilotLink& link)
-    : link_(link), parameters_(parameter_table(c)), own_(c, flight, link), tell_texts_(c.telemetry.texts), bins_(bins_of(c)) {
+    : link_(link),
+      parameters_(parameter_table(c)),
+      own_(c, flight, link),
+      tell_texts_(c.telemetry.texts),
+      bins_(bins_of(c)) {
   const TelemetryConfig& t = c.telemetry;
   const auto set = [&](Kind kind, std::uint32_t id, double rate_hz) {
     streams_[kind].id = id;
@@ -176,7 +176,7 @@ std::size_t Telemetry::next(TimeNs now_ns, LineGate& gate, std::span<std::uint8_
     Stream& s = streams_[i];
     if (!s.due(now_ns) || !gate.affords(size_of(s.id), now_ns)) continue;
     const std::size_t n = stream(static_cast<Kind>(i), now_ns, out);
-    if (n == 0) continue;  // nothing to be said of it now
+    if (n == 0) continue;                             // nothing to be said of it now
     if (i == kField && own_.field_begun()) return n;  // its other parts follow as soon as there is room
     s.once = false;
     s.due_ns = s.due_ns + s.interval_ns > now_ns ? s.due_ns + s.interval_ns : now_ns + s.interval_ns;
@@ -245,7 +245,7 @@ std::size_t Telemetry::computer(TimeNs now_ns, std::span<std::uint8_t> out) WASP
   if (!inbox_.computer.load(m)) return 0;
   const TimeNs read_at_ns = static_cast<TimeNs>(m.uptime) * kMillisecond;
   if (now_ns - read_at_ns > kComputerStale) return 0;
-  m.time_usec = microseconds(told_time(link_, read_at_ns));
+  m.time_usec = told_us(link_, read_at_ns);
   return link_.encode(m, out);
 }
 
@@ -264,7 +264,7 @@ std::size_t Telemetry::obstacles(TimeNs now_ns, std::span<std::uint8_t> out) WAS
   obstacles_sent_ = sample.number;
   if (!bins.valid) return 0;
   ObstacleDistance m;
-  m.time_usec = microseconds(told_time(link_, shown_at_ns - interval_ns));
+  m.time_usec = told_us(link_, shown_at_ns - interval_ns);
   m.distances = bins.distance_cm;
   m.min_distance = static_cast<std::uint16_t>(std::lround(100.f * bins_.least_m));
   m.max_distance = static_cast<std::uint16_t>(std::lround(100.f * bins_.greatest_m));
@@ -284,7 +284,7 @@ std::size_t Telemetry::flow(TimeNs now_ns, std::span<std::uint8_t> out) WASP_REA
   const DurationNs integrated_ns = flow_sum_.until_ns() - flow_sum_.from_ns();
   if (integrated_ns < streams_[kFlow].interval_ns / 2 && !streams_[kFlow].once) return 0;
   OpticalFlowRad m;
-  m.time_usec = microseconds(told_time(link_, flow_sum_.until_ns()));
+  m.time_usec = told_us(link_, flow_sum_.until_ns());
   m.integration_time_us = static_cast<std::uint32_t>(integrated_ns / kMicrosecond);
   m.integrated_x = flow_sum_.flow_x_rad();
   m.integrated_y = flow_sum_.flow_y_rad();

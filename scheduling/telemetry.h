@@ -1,8 +1,9 @@
 // What wasp tells besides setpoints, on the autopilot's line: answers to commands and parameter requests, texts, the
-// computer's state, and what the behaviours see - OBSTACLE_DISTANCE, OPTICAL_FLOW_RAD, height and time to contact, and wasp's own messages. The
-// link thread speaks it, one frame at a time, when the line has room (scheduling/line_gate.h); what behaviours saw is
-// put together at that moment from their newest words and never older than their age limits: a blind behaviour makes
-// silence. Two inboxes are written by the main thread, which never waits for the link's and is never waited for.
+// computer's state, and what the behaviours see - OBSTACLE_DISTANCE, OPTICAL_FLOW_RAD, height and time to contact, and
+// wasp's own messages. The link thread speaks it, one frame at a time, when the line has room (scheduling/line_gate.h);
+// what behaviours saw is put together at that moment from their newest words and never older than their age limits: a
+// blind behaviour makes silence. Two inboxes are written by the main thread, which never waits for the link's and is
+// never waited for.
 #pragma once
 
 #include <array>
@@ -65,7 +66,18 @@ class Telemetry {
 
  private:
   static constexpr int kFramesPerServe = 6;
-  enum Kind : std::size_t { kComputer, kObstacles, kFlow, kHeight, kContact, kCues, kLatencies, kState, kField, kKinds };
+  enum Kind : std::size_t {
+    kComputer,
+    kObstacles,
+    kFlow,
+    kHeight,
+    kContact,
+    kCues,
+    kLatencies,
+    kState,
+    kField,
+    kKinds
+  };
   struct Stream {
     std::uint32_t id = 0;
     DurationNs usual_ns = 0, interval_ns = 0;  ///< 0: not sent

@@ -213,7 +213,7 @@ CommandResult AutopilotLink::reboot(const mavlink::CommandLong& command, TimeNs 
   apply_parameters();
   failures_ = SensorFailures();
   clock_offset_ns_ = -now_ns;
-  ticks_ = 0;  // a heartbeat first
+  ticks_ = 0;                                                   // a heartbeat first
   for (Stream& stream : streams_) stream.every = stream.usual;  // what was asked of it is forgotten
   silent_until_ns_ = now_ns + kRebootTime;
   return CommandResult::kAccepted;
@@ -229,7 +229,8 @@ void AutopilotLink::on_command(const mavlink::CommandLong& command, const mavlin
   ack.target_component = frame.component_id;
   send(ack);
   if (now_ns < silent_until_ns_) return;
-  if (!is(Flavour::kWasp) && command.command == mavlink::mav_cmd::kComponentArmDisarm && result == CommandResult::kTemporarilyRejected)
+  if (!is(Flavour::kWasp) && command.command == mavlink::mav_cmd::kComponentArmDisarm &&
+      result == CommandResult::kTemporarilyRejected)
     send_text(flight_.settled() ? "PreArm: not on the ground" : "PreArm: attitude estimate not settled", 4);
   send_heartbeat();  // the new state at once, not within a second
 }

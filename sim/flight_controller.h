@@ -21,7 +21,13 @@ inline constexpr DurationNs kSetpointTimeout_ns = 500 * kMillisecond;
 enum class ControllerMode : std::uint32_t { kManual = 0, kOffboard = 1, kLand = 2 };
 
 /// Answers to commands, as MAV_RESULT numbers.
-enum class CommandResult : std::uint8_t { kAccepted = 0, kTemporarilyRejected = 1, kDenied = 2, kUnsupported = 3, kFailed = 4 };
+enum class CommandResult : std::uint8_t {
+  kAccepted = 0,
+  kTemporarilyRejected = 1,
+  kDenied = 2,
+  kUnsupported = 3,
+  kFailed = 4
+};
 
 class FlightController {
  public:
@@ -31,7 +37,8 @@ class FlightController {
   std::array<double, 4> step(const ImuSample& imu, bool on_ground, TimeNs now_ns);
 
   void set_setpoint(const AttitudeSetpoint& setpoint, TimeNs now_ns);
-  /// Disarming in flight, or while a stream asks it to stay up, needs `force`; arming needs a settled estimate and ground under the legs.
+  /// Disarming in flight, or while a stream asks it to stay up, needs `force`; arming needs a settled estimate and
+  /// ground under the legs.
   CommandResult arm(bool armed, bool force);
   /// As after power-up: disarmed, manual, nothing estimated. In the air the vehicle falls.
   void restart() { *this = FlightController(params_, kind_); }

@@ -14,7 +14,7 @@ constexpr DurationNs kBeat = kSecond, kSync = 100 * kMillisecond, kAsk = 2 * kSe
                      kQuiet = 10 * kSecond;
 constexpr int kOften = 10;        // questions at the short interval
 constexpr int kStreamsAfter = 2;  // questions before the old way of asking is tried as well
-constexpr double kArmedHz = 5;  ///< of HEARTBEAT: until it says armed the vehicle is kept at the start
+constexpr double kArmedHz = 5;    ///< of HEARTBEAT: until it says armed the vehicle is kept at the start
 constexpr double kEnough = 0.7;   // of the rate asked for
 constexpr std::uint8_t kStreamPosition = 6, kStreamExtra1 = 10;  // MAV_DATA_STREAM: position, attitude
 

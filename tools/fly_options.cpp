@@ -61,10 +61,11 @@ std::optional<int> parse_fly_options(int argc, char** argv, FlyOptions& o) {
   app.add_option("--autopilot", o.autopilot,
                  "whose autopilot flies: the simulator behaves as that one, and wasp is told (docs/autopilots.md)")
       ->check(CLI::IsMember({"wasp", "px4", "ardupilot"}));
-  app.add_option("--follow", o.follow,
-                 "fly the autopilot at [autopilot] endpoint of --config (a real one, or its own simulator) with a\n"
-                 "simulated camera that goes where it says it is: by 'flight' on that line, or by a second ENDPOINT of\n"
-                 "its, as tcp://127.0.0.1:5762 (docs/services.md)")
+  app.add_option(
+         "--follow", o.follow,
+         "fly the autopilot at [autopilot] endpoint of --config (a real one, or its own simulator) with a\n"
+         "simulated camera that goes where it says it is: by 'flight' on that line, or by a second ENDPOINT of\n"
+         "its, as tcp://127.0.0.1:5762 (docs/services.md)")
       ->excludes("--replay", "--autopilot")
       ->needs("--config");
   app.add_option("--udp", o.udp_port, "link by UDP to this port in place of a serial line")

@@ -16,9 +16,9 @@ struct FlyOptions {
   std::string mission = "hover";
   std::string world;      ///< VRML97 file to fly in, empty: that of the mission
   std::string autopilot;  ///< whose autopilot flies: px4, ardupilot; empty: as configured, and wasp's own simulated
-  std::string follow;     ///< the configured autopilot is another program: where its pose is read; empty: it is simulated
-  int udp_port = 0;       ///< link by datagrams to this port of ours; 0: a serial line
-  double seconds = 0;     ///< total flight time, 0: as configured
+  std::string follow;  ///< the configured autopilot is another program: where its pose is read; empty: it is simulated
+  int udp_port = 0;    ///< link by datagrams to this port of ours; 0: a serial line
+  double seconds = 0;  ///< total flight time, 0: as configured
   std::uint64_t seed = 1;
   bool no_rt = false;    ///< never ask for real time
   bool enforce = false;  ///< refuse to fly without it

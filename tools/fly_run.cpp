@@ -80,7 +80,7 @@ void write_override(Run& run, const sim::SimConfig& sim) {
   std::string text = "# written by wasp fly for this run\n[run]\n";
   text += fmt::format("enforce_real_time = {}\nstrict_syscalls = {}\n", run.real_time, run.options.strict_syscalls);
   text += fmt::format("incident_dir = \"{}\"\n", fs::absolute(run.folder / "incidents").string());
-  if (!on_hardware(run) && !follows(run)) {
+  if (!flies_configured_autopilot(run)) {
     const std::string line = run.options.udp_port > 0
                                  ? fmt::format("udp://127.0.0.1:{}", run.options.udp_port)
                                  : fmt::format("serial:{}:921600", fs::absolute(run.folder / "tty").string());
@@ -193,34 +193,25 @@ std::vector<std::string> flight_arguments(const Run& run) {
 
 bool follows(const Run& run) { return !run.options.follow.empty(); }
 
-/// The camera alone, led by the pose of the vehicle that another program flies.
-std::vector<std::string> following_sim_arguments(const Run& run) {
+bool flies_configured_autopilot(const Run& run) { return on_hardware(run) || follows(run); }
+
+std::vector<std::string> sim_arguments(const Run& run) {
   std::vector<std::string> a{program("wasp-sim"),
                              "--instance",
                              run.instance,
-                             "--follow",
-                             run.options.follow,
                              "--config",
                              (run.mission / "sim.toml").string(),
                              "--seed",
                              std::to_string(run.options.seed)};
   if (!run.options.world.empty()) a.insert(a.end(), {"--world", run.options.world});
-  return a;
-}
-
-std::vector<std::string> sim_arguments(const Run& run) {
-  if (follows(run)) return following_sim_arguments(run);
-  std::vector<std::string> a{
-      program("wasp-sim"),
-      "--instance",
-      run.instance,
-      run.options.udp_port > 0 ? "--udp" : "--tty-link",
-      run.options.udp_port > 0 ? fmt::format("127.0.0.1:{}", run.options.udp_port) : (run.folder / "tty").string(),
-      "--config",
-      (run.mission / "sim.toml").string(),
-      "--seed",
-      std::to_string(run.options.seed)};
-  if (!run.options.world.empty()) a.insert(a.end(), {"--world", run.options.world});
+  if (follows(run)) {  // the camera alone, led by the pose of the vehicle that another program flies
+    a.insert(a.end(), {"--follow", run.options.follow});
+    return a;
+  }
+  if (run.options.udp_port > 0)
+    a.insert(a.end(), {"--udp", fmt::format("127.0.0.1:{}", run.options.udp_port)});
+  else
+    a.insert(a.end(), {"--tty-link", (run.folder / "tty").string()});
   const auto autopilot = scheduling::load_guard_plan(configuration_files(run)).autopilot;
   const std::string flavour(drivers::facts_of(autopilot.flavour).name);
   a.insert(a.end(), {"--autopilot", run.options.autopilot.empty() ? flavour : run.options.autopilot});

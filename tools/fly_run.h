@@ -15,7 +15,7 @@ struct Run {
   std::filesystem::path folder;
   std::filesystem::path mission;  ///< folder with its sim.toml and flight.toml
   std::string instance;
-  std::string camera_driver = "sim";    ///< as configured; a device: real hardware, no simulator
+  std::string camera_driver = "sim";  ///< as configured; a device: real hardware, no simulator
   bool real_time = false;
   std::string note;  ///< why it is not real time
   double flight_seconds = 80;
@@ -45,6 +45,8 @@ std::vector<std::string> camera_arguments(const Run& run);
 bool on_hardware(const Run& run);
 /// True where the configured autopilot flies and only the camera is simulated.
 bool follows(const Run& run);
+/// Either: the autopilot is the one that the configuration names, and nobody knows the truth.
+bool flies_configured_autopilot(const Run& run);
 std::vector<std::string> recorder_arguments(const Run& run);
 
 /// Throws std::runtime_error naming the path.

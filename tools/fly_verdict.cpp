@@ -85,7 +85,7 @@ std::vector<Result> judged_by_mission(const Run& run) {
 /// What this mission must show beyond being flown to its end. One that was cut short, by an interrupt or by --seconds,
 /// is reported but not judged: nobody flies 60 m in ten seconds.
 std::vector<Result> mission_results(const Run& run, const std::vector<Phase>& phases, bool cut_short) {
-  if (!run.options.replay.empty() || on_hardware(run) || follows(run)) return {};  // nobody knows the truth
+  if (!run.options.replay.empty() || flies_configured_autopilot(run)) return {};  // nobody knows the truth
   if (run.options.mission == "hover") return hover_results(run.folder / "log", phases);
   auto results = judged_by_mission(run);
   if (cut_short || run.options.seconds > 0)

@@ -39,7 +39,7 @@ void FlyWorld::start() {
 }
 
 bool FlyWorld::there() const {
-  if (on_hardware(run_) || follows(run_)) return is_written(shm::camera_region(run_.instance));
+  if (flies_configured_autopilot(run_)) return is_written(shm::camera_region(run_.instance));
   return run_.options.udp_port > 0 || fs::exists(run_.folder / "tty");  // over UDP the simulator speaks first
 }
 

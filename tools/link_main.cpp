@@ -64,7 +64,8 @@ int run(Options& o) {
 int main(int argc, char** argv) {
   CLI::App app{
       "Who is on a line, which messages come how often, what the autopilot's parameters say, and whether it\n"
-      "can be flown by setpoints. Exit code 0: it can, and was flown and landed where that was asked for; 1: not, or not\n"
+      "can be flown by setpoints. Exit code 0: it can, and was flown and landed where that was asked for; 1: not, or "
+      "not\n"
       "heard; 2: bad arguments."};
   Options options;
   declare(app, options);

@@ -337,8 +337,8 @@ INSTANTIATE_TEST_SUITE_P(Autopilots, FlyAs,
 TEST(Fly, AnAutopilotOfItsOwnByTheEyesOfACameraThatFollowsIt) {
   const TemporaryFolder out;
   const std::string port = std::to_string(free_udp_port());
-  Program vehicle({program_path("wasp-sim"), "--instance", unique("other"), "--no-camera", "--autopilot", "ardupilot", "--udp",
-                   "127.0.0.1:" + port});
+  Program vehicle({program_path("wasp-sim"), "--instance", unique("other"), "--no-camera", "--autopilot", "ardupilot",
+                   "--udp", "127.0.0.1:" + port});
   const fs::path config = out.path / "other.toml";
   std::ofstream(config) << "[autopilot]\nflavour = \"ardupilot\"\nendpoint = \"udp://127.0.0.1:" << port << "\"\n";
   const std::string name = fly_to_the_end(out, "follow", "--seconds 12 --follow flight --config " + config.string());
@@ -351,7 +351,8 @@ TEST(Fly, AnAutopilotOfItsOwnByTheEyesOfACameraThatFollowsIt) {
 TEST(FlyRefuses, AnAutopilotThatIsNotTheOneConfigured) {
   const TemporaryFolder out;
   const std::string name = unique("wrong"), port = std::to_string(free_udp_port());
-  Program vehicle({program_path("wasp-sim"), "--instance", unique("other"), "--no-camera", "--udp", "127.0.0.1:" + port});
+  Program vehicle(
+      {program_path("wasp-sim"), "--instance", unique("other"), "--no-camera", "--udp", "127.0.0.1:" + port});
   const fs::path config = out.path / "wrong.toml";
   std::ofstream(config) << "[autopilot]\nflavour = \"px4\"\nendpoint = \"udp://127.0.0.1:" << port
                         << "\"\n[mission]\npatience_s = 4\n";

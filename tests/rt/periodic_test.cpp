@@ -87,7 +87,8 @@ TEST(PeriodicGrid, NeverReleasesThePastAndNeverMovesOverAnyStall) {
 
 TEST(PeriodicGrid, WhatIsDueNextIsWhatSkippingWaitsFor) {
   constexpr DurationNs kTick = 50 * kMillisecond;
-  for (const DurationNs stall : {DurationNs{1}, 49 * kMillisecond, kTick, kTick + 1, 100 * kMillisecond, 130 * kMillisecond}) {
+  for (const DurationNs stall :
+       {DurationNs{1}, 49 * kMillisecond, kTick, kTick + 1, 100 * kMillisecond, 130 * kMillisecond}) {
     PeriodicGrid grid(kSecond, kTick);
     const Release first = grid.next(kSecond);
     const TimeNs now_ns = first.due_at_ns + stall;

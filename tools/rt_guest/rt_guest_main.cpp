@@ -104,10 +104,9 @@ std::optional<int> parse(int argc, char** argv, Options& o) {
   app.add_option("--stress-cycles", o.stress_cycles, "control cycles under stress-ng (0: as the form says)")
       ->check(CLI::Range(0, 10'000'000));
   app.add_flag("--stress", o.stress, "as many cycles under stress-ng as in the quiet flight");
-  auto* faults =
-      app.add_flag("--faults", o.faults,
-                   "instead: every kind of fault that a flight on replayed frames can show, on virtual time")
-          ->excludes(full);
+  auto* faults = app.add_flag("--faults", o.faults,
+                              "instead: every kind of fault that a flight on replayed frames can show, on virtual time")
+                     ->excludes(full);
   app.add_option("--only", o.only, "of those, the ones whose names this regular expression finds")
       ->needs(faults)
       ->check([](const std::string& text) { return text.find(' ') == text.npos ? "" : "no spaces, please"; });
